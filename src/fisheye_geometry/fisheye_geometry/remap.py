@@ -1,0 +1,154 @@
+"""Remap tables: where each pixel of a corrected picture comes from, computed once."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import cv2
+import numpy as np
+
+from fisheye_geometry.errors import GeometryError, ImageFormatError
+from fisheye_geometry.lens import Lens
+from fisheye_geometry.surface import Surface
+
+_INTERPOLATIONS = {
+    'nearest': cv2.INTER_NEAREST,
+    'linear': cv2.INTER_LINEAR,
+    'cubic': cv2.INTER_CUBIC,
+}
+INTERPOLATIONS = tuple(_INTERPOLATIONS)
+
+_OUTSIDE_PX = -100
+"""Far enough from the picture that no interpolation reaches it."""
+_BAND_ROWS = 64
+"""Rows computed at once, which bounds the memory that the float64 rays take."""
+
+
+@dataclass(frozen=True)
+class Turn:
+    """Attitude of a camera in the frame of its surface, rad.
+
+    Yaw turns the camera to the right, pitch up, roll clockwise as the camera sees it, in the
+    order yaw, pitch, roll.
+    """
+
+    yaw_rad: float = 0.0
+    pitch_rad: float = 0.0
+    roll_rad: float = 0.0
+
+    @property
+    def matrix(self) -> np.ndarray:
+        """Rotation (3, 3) that takes rays of the camera to rays of the surface."""
+        (cy, sy), (cp, sp), (cr, sr) = (
+            (np.cos(angle), np.sin(angle))
+            for angle in (self.yaw_rad, self.pitch_rad, self.roll_rad)
+        )
+        yaw = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+        pitch = np.array([[1, 0, 0], [0, cp, -sp], [0, sp, cp]])
+        roll = np.array([[cr, -sr, 0], [sr, cr, 0], [0, 0, 1]])
+        return yaw @ pitch @ roll
+
+
+LEVEL = Turn()
+
+
+class RemapTable:
+    """Fixed-point maps from a picture to a surface.
+
+    The picture is a camera's (seen through its lens) or itself on a surface, to be turned or cut.
+
+    Attributes
+    ----------
+    surface : Surface
+        What the corrected picture shows.
+    valid : ndarray
+        (height, width) bool, read-only: where the camera sees anything.
+    """
+
+    def __init__(
+        self,
+        source: Lens | Surface,
+        surface: Surface,
+        interpolation: str = 'linear',
+        turn: Turn = LEVEL,
+    ):
+        if interpolation not in _INTERPOLATIONS:
+            raise GeometryError(
+                f"interpolation '{interpolation}' is not known; "
+                f'expected one of {", ".join(INTERPOLATIONS)}'
+            )
+        self.surface = surface
+        self._input_shape = (source.height, source.width)
+        self._flag = _INTERPOLATIONS[interpolation]
+        shape = (surface.height, surface.width)
+        self.valid = np.empty(shape, bool)
+        self._pixels = np.empty((*shape, 2), np.int16)
+        nearest = interpolation == 'nearest'
+        self._fractions = None if nearest else np.empty(shape, np.uint16)
+        for top in range(0, surface.height, _BAND_ROWS):
+            rows = slice(top, min(top + _BAND_ROWS, surface.height))
+            where, self.valid[rows] = _source_pixels(source, surface, turn, rows)
+            pixels, fractions = cv2.convertMaps(
+                where, None, cv2.CV_16SC2, nninterpolation=nearest
+            )
+            self._pixels[rows] = pixels
+            if not nearest:
+                self._fractions[rows] = fractions
+        for array in (self.valid, self._pixels, self._fractions):
+            if array is not None:
+                array.setflags(write=False)
+
+    def __call__(self, image: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
+        """Correct a picture.
+
+        Parameters
+        ----------
+        image
+            (height, width[, channels]) uint8 of the lens's size.
+        out
+            Where to put the result, a slice of a larger picture perhaps; a new array if None.
+
+        Returns
+        -------
+        ndarray
+            (surface.height, surface.width[, channels]) uint8, 0 where nothing is seen.
+
+        Raises
+        ------
+        ImageFormatError
+            If `image` has not the source's size, or `out` does not fit.
+        """
+        if image.shape[:2] != self._input_shape:
+            height, width = self._input_shape
+            raise ImageFormatError(
+                f'the picture has {image.shape[1]}x{image.shape[0]} px; '
+                f'its calibration is for {width}x{height} px'
+            )
+        expected = self.valid.shape + image.shape[2:]
+        if out is not None and (out.shape != expected or out.dtype != image.dtype):
+            raise ImageFormatError(f'out is {out.dtype}{out.shape}; expected {expected}')
+        return cv2.remap(
+            image, self._pixels, self._fractions, self._flag, dst=out,
+            borderMode=cv2.BORDER_CONSTANT,
+        )
+
+
+def _source_pixels(source: Lens | Surface, surface: Surface, turn: Turn, rows: slice):
+    """Pixels (rows, width, 2) float32 of the source's picture, and where there are any."""
+    y, x = np.ogrid[rows, : surface.width]
+    pixels, seen = source.project(surface.rays(x, y) @ turn.matrix)
+    last = np.array([source.width - 1, source.height - 1])
+    # A pixel is half a pixel wide to each side; beyond its centre the outermost is repeated.
+    seen &= np.all((pixels >= -0.5) & (pixels <= last + 0.5), axis=-1)
+    where = np.where(seen[..., None], np.clip(pixels, 0, last), _OUTSIDE_PX)
+    return where.astype(np.float32), seen
+
+
+@lru_cache(maxsize=16)
+def remap_table(
+    source: Lens | Surface,
+    surface: Surface,
+    interpolation: str = 'linear',
+    turn: Turn = LEVEL,
+) -> RemapTable:
+    """Build a `RemapTable`, or give the one that was built from the same arguments."""
+    return RemapTable(source, surface, interpolation, turn)
