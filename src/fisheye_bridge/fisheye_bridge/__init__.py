@@ -1,0 +1,1 @@
+"""Between ROS 2 and arrays: images, camera_info, parameters, QoS, diagnostics, running."""

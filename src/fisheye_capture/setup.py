@@ -1,0 +1,19 @@
+from setuptools import setup
+
+package_name = 'fisheye_capture'
+
+setup(
+    name=package_name,
+    version='0.1.0',
+    packages=[package_name],
+    data_files=[
+        ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
+        (f'share/{package_name}', ['package.xml']),
+    ],
+    extras_require={'test': ['pytest']},
+    entry_points={
+        'console_scripts': [
+            'capture_node = fisheye_capture.capture_node:main',
+        ],
+    },
+)

@@ -1,0 +1,1 @@
+"""Fisheye lenses, projection surfaces and the remap tables between them."""

@@ -1,0 +1,1 @@
+"""Lens calibration from circle grids and the correction of fisheye distortion."""

@@ -1,0 +1,1 @@
+"""Overlap calibration and live stitching of fisheye cameras to one panorama."""
