@@ -5,41 +5,56 @@ import numpy as np
 from fisheye_geometry.lens import Lens
 
 _DARK_LEVEL = 16
-"""Brighter than the noise of an unlit sensor, grey levels."""
-_LIT_SHARE = 0.02
-"""A ring with a larger share of pixels above `_DARK_LEVEL` lies inside the circle."""
-_RINGS = 400
-_SAMPLES = 640
+"""An unlit sensor stays below it, but for a few noisy pixels; grey levels."""
+_LIT, _UNLIT = 0.5, 0.15
+"""Shares of brighter pixels in the last ring of the circle and in all rings beyond its edge."""
+_RING_RAD = np.radians(0.4)
+_EDGE_RINGS = 3
+"""Rings that the edge of the circle may blur."""
+_COLUMNS = 640
 """Columns that are enough to measure the circle."""
 
 
-def lit_angle(lens: Lens, image: np.ndarray) -> float:
-    """Find the angle from the axis beyond which a picture is dark all around.
+class ImageCircle:
+    """Finds the angle beyond which a lens leaves its pictures dark all around.
 
-    Night looks like a small circle: take the largest of several pictures.
+    Only a sharp edge all around counts, so that a lamp at night is no circle; and what was once
+    seen lit is never taken for dark again.
 
-    Parameters
+    Attributes
     ----------
-    lens
-        The camera that took it.
-    image
-        (height, width[, channels]) uint8 of the lens's size.
-
-    Returns
-    -------
-    float
-        rad, `lens.max_angle_rad` at most: equal to it where the light reaches the corners.
+    angle_rad : float
+        Radius of the circle, rad; the lens's `max_angle_rad` where none was found.
     """
-    step = max(1, lens.width // _SAMPLES)
-    image = image[::step, ::step]
-    brightness = image if image.ndim == 2 else image.max(axis=2)
-    y, x = np.ogrid[0 : lens.height : step, 0 : lens.width : step]
-    rays, seen = lens.unproject(np.stack(np.broadcast_arrays(x, y), axis=-1))
-    angle = np.where(seen, np.arccos(rays[..., 2].clip(-1, 1)), np.inf)
-    edges = np.linspace(0, lens.max_angle_rad, _RINGS + 1)
-    pixels, _ = np.histogram(angle, edges)
-    lit, _ = np.histogram(angle[brightness > _DARK_LEVEL], edges)
-    rings = np.flatnonzero(lit > _LIT_SHARE * np.maximum(pixels, 1))
-    outermost = edges[rings[-1] + 1] if len(rings) else 0.0
-    present = edges[np.flatnonzero(pixels)[-1] + 1]
-    return lens.max_angle_rad if outermost >= present else float(outermost)
+
+    def __init__(self, lens: Lens):
+        self._lens = lens
+        self._step = max(1, lens.width // _COLUMNS)
+        y, x = np.ogrid[0 : lens.height : self._step, 0 : lens.width : self._step]
+        rays, seen = lens.unproject(np.stack(np.broadcast_arrays(x, y), axis=-1))
+        angle = np.arccos(rays[..., 2].clip(-1, 1))
+        self._ring = np.where(seen, angle // _RING_RAD, 0).astype(np.intp).ravel()
+        self._pixels = np.bincount(self._ring)
+        self._found = False
+        self.angle_rad = lens.max_angle_rad
+
+    def look(self, image: np.ndarray) -> bool:
+        """Learn from a picture (height, width[, channels]); whether `angle_rad` changed."""
+        if image.shape[:2] != (self._lens.height, self._lens.width):
+            return False
+        image = image[:: self._step, :: self._step]
+        # One channel is enough, and green has the least noise.
+        bright = (image if image.ndim == 2 else image[..., 1]) > _DARK_LEVEL
+        lit = np.bincount(self._ring, bright.ravel()) / np.maximum(self._pixels, 1)
+        rings = np.flatnonzero(lit >= _LIT)
+        if not len(rings):
+            return False
+        last = rings[-1]
+        beyond = lit[last + 1 + _EDGE_RINGS :][self._pixels[last + 1 + _EDGE_RINGS :] > 0]
+        is_circle = len(beyond) and beyond.max() < _UNLIT
+        angle = (last + 1) * _RING_RAD if is_circle else self._lens.max_angle_rad
+        if (self._found or not is_circle) and angle <= self.angle_rad + _RING_RAD:
+            return False
+        self._found = self._found or bool(is_circle)
+        self.angle_rad = float(min(angle, self._lens.max_angle_rad))
+        return True

@@ -123,7 +123,7 @@ class Surface:
         y = np.where(seen, b, 0.0) * self.focal_px + self.center_y_px
         return np.stack([x, y], axis=-1), seen
 
-    def window(self, x_px: int, y_px: int, width: int, height: int) -> 'Surface':
+    def window(self, x_px: float, y_px: float, width: int, height: int) -> 'Surface':
         """Give the part whose upper left pixel is (x_px, y_px); it may reach past the edges."""
         return replace(
             self,
@@ -131,6 +131,18 @@ class Surface:
             height=height,
             center_x_px=self.center_x_px - x_px,
             center_y_px=self.center_y_px - y_px,
+        )
+
+    def with_focal(self, focal_px: float) -> 'Surface':
+        """Give the same view, larger or smaller, so that `focal_px` is this one."""
+        zoom = focal_px / self.focal_px
+        return replace(
+            self,
+            width=round(self.width * zoom),
+            height=round(self.height * zoom),
+            focal_px=focal_px,
+            center_x_px=(self.center_x_px + 0.5) * zoom - 0.5,
+            center_y_px=(self.center_y_px + 0.5) * zoom - 0.5,
         )
 
 

@@ -1,0 +1,54 @@
+"""The node's state on /diagnostics, once a second."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
+
+OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+
+
+@dataclass
+class Report:
+    """What a node says of itself: the worst level with the sentences that explain it."""
+
+    level: bytes = OK
+    reasons: list[str] = field(default_factory=list)
+    values: dict[str, Any] = field(default_factory=dict)
+
+    def add(self, level: bytes, reason: str) -> None:
+        """Add a sentence; the level rises to its level."""
+        self.level = max(self.level, level)
+        self.reasons.append(reason)
+
+
+class Diagnostics:
+    """Publishes a node's report each second."""
+
+    def __init__(self, node: Node, fill: Callable[[Report], None]):
+        """Start; `fill` is called with an empty report each second."""
+        self._node = node
+        self._fill = fill
+        self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self._timer = node.create_timer(1.0, self._publish)
+
+    def _publish(self) -> None:
+        report = Report()
+        self._fill(report)
+        name = self._node.get_fully_qualified_name()
+        status = DiagnosticStatus(
+            level=report.level,
+            name=name.lstrip('/'),
+            hardware_id=name,
+            message='; '.join(report.reasons) or 'running',
+            values=[KeyValue(key=key, value=_text(value)) for key, value in report.values.items()],
+        )
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        self._publisher.publish(message)
+
+
+def _text(value: Any) -> str:
+    return f'{value:.4g}' if isinstance(value, float) else str(value)

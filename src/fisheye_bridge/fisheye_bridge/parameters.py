@@ -1,0 +1,109 @@
+"""ROS parameters declared from a settings dataclass, checked and kept up to date."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from fisheye_geometry.errors import FisheyeError, SettingError
+from fisheye_geometry.settings import Rule, convert, describe_range, rules
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
+from rclpy.exceptions import InvalidParameterValueException
+from rclpy.node import Node
+
+
+class Parameters:
+    """The parameters of a node that one settings dataclass describes.
+
+    Attributes
+    ----------
+    settings
+        The current values, an instance of the dataclass.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        settings: type,
+        *,
+        prefix: str = '',
+        on_change: Callable[[Any], None] | None = None,
+        **defaults: Any,
+    ):
+        """Declare the parameters.
+
+        Parameters
+        ----------
+        node
+            The node that gets them.
+        settings
+            A frozen dataclass of `fisheye_geometry.settings.setting` fields.
+        prefix
+            Put before each name, with its dot (`left.`).
+        on_change
+            Called with the new settings before a live change is taken; a `FisheyeError` that it
+            raises refuses the change.
+        **defaults
+            Instead of the dataclass's own.
+
+        Raises
+        ------
+        SettingError
+            If a value given at start is not possible.
+        """
+        self._rules = rules(settings)
+        self._prefix = prefix
+        self._on_change = on_change
+        values = {}
+        for name, (kind, default, rule) in self._rules.items():
+            default = defaults.get(name, default)
+            start = list(default) if isinstance(default, tuple) else default
+            full_name = prefix + name
+            try:
+                parameter = node.declare_parameter(full_name, start, _descriptor(rule, kind))
+            except InvalidParameterValueException as error:
+                raise SettingError(str(error)) from error
+            values[name] = convert(full_name, parameter.value, kind, rule)
+        self.settings = settings(**values)
+        node.add_on_set_parameters_callback(self._set)
+
+    def _set(self, parameters) -> SetParametersResult:
+        changes = {}
+        try:
+            for parameter in parameters:
+                name = parameter.name.removeprefix(self._prefix)
+                if parameter.name == self._prefix + name and name in self._rules:
+                    kind, _, rule = self._rules[name]
+                    changes[name] = convert(parameter.name, parameter.value, kind, rule)
+            changed = replace(self.settings, **changes)
+            # NaN differs from itself, but not in print.
+            if repr(changed) != repr(self.settings):
+                if self._on_change:
+                    self._on_change(changed)
+                self.settings = changed
+        except FisheyeError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+
+def _descriptor(rule: Rule, kind: type) -> ParameterDescriptor:
+    """Describe a setting; its type stays open so that a whole number can stand for a float."""
+    descriptor = ParameterDescriptor(
+        description=rule.help,
+        additional_constraints=describe_range(rule),
+        read_only=not rule.live,
+        dynamic_typing=True,
+    )
+    if rule.minimum is not None and rule.maximum is not None and not rule.nan:
+        low, high = rule.minimum, rule.maximum
+        if kind is int:
+            descriptor.integer_range = [IntegerRange(from_value=int(low), to_value=int(high))]
+        elif kind is float:
+            descriptor.floating_point_range = [
+                FloatingPointRange(from_value=float(low), to_value=float(high))
+            ]
+    return descriptor

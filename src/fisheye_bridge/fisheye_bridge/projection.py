@@ -1,0 +1,30 @@
+"""fisheye_msgs/Projection to surface and back."""
+
+from fisheye_geometry.surface import Surface
+from fisheye_msgs.msg import Projection
+from std_msgs.msg import Header
+
+
+def surface_of(message: Projection) -> Surface:
+    """Give the surface that a message describes; a `GeometryError` if there is no such surface."""
+    return Surface(
+        kind=message.surface,
+        width=message.width,
+        height=message.height,
+        focal_px=message.focal_px,
+        center_x_px=message.center_x_px,
+        center_y_px=message.center_y_px,
+    )
+
+
+def projection_of(surface: Surface, header: Header) -> Projection:
+    """Describe a surface in a message."""
+    return Projection(
+        header=header,
+        surface=surface.kind,
+        width=surface.width,
+        height=surface.height,
+        focal_px=surface.focal_px,
+        center_x_px=surface.center_x_px,
+        center_y_px=surface.center_y_px,
+    )

@@ -1,0 +1,15 @@
+"""Quality of service, one profile for each kind of topic."""
+
+from rclpy.qos import DurabilityPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
+
+IMAGE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
+"""Images: nothing is lost on the way, and only the newest waits."""
+
+LATCHED = QoSProfile(
+    depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+)
+"""State: who comes later still gets the last one."""
+
+ADJUSTABLE = QoSOverridingOptions((QoSPolicyKind.RELIABILITY, QoSPolicyKind.DEPTH))
+"""Lets a parameter `qos_overrides.TOPIC.subscription.reliability` meet a best-effort camera."""

@@ -1,0 +1,95 @@
+"""Image topics: the raw picture and beside it the JPEG that image_transport would publish."""
+
+from collections.abc import Callable
+
+import numpy as np
+from fisheye_geometry.errors import FisheyeError
+from rclpy.callback_groups import CallbackGroup
+from rclpy.node import Node
+from sensor_msgs.msg import CompressedImage, Image
+from std_msgs.msg import Header
+
+from fisheye_bridge.images import from_jpeg, to_array, to_jpeg
+from fisheye_bridge.qos import ADJUSTABLE, IMAGE
+
+TRANSPORTS = ('raw', 'compressed')
+_WARNING_PAUSE_S = 5.0
+
+
+class ImagePublisher:
+    """Publishes a picture raw and, on the `compressed` sub-topic, as JPEG; each only if wanted."""
+
+    def __init__(self, node: Node, topic: str):
+        self._raw = node.create_publisher(Image, topic, IMAGE)
+        self._jpeg = node.create_publisher(CompressedImage, f'{topic}/compressed', IMAGE)
+
+    @property
+    def wanted(self) -> bool:
+        """Whether anybody subscribes."""
+        return bool(self._raw.get_subscription_count() or self._jpeg.get_subscription_count())
+
+    def publish(self, message: Image, image: np.ndarray, jpeg_quality: int) -> None:
+        """Publish a message; `image` is the array (height, width[, 3]) of its pixels."""
+        if self._raw.get_subscription_count():
+            self._raw.publish(message)
+        if self._jpeg.get_subscription_count():
+            self._jpeg.publish(to_jpeg(image, message.encoding, message.header, jpeg_quality))
+
+
+class ImageSubscription:
+    """Hands over the pictures of a topic as arrays, and keeps what is broken away.
+
+    Attributes
+    ----------
+    refused : int
+        Pictures that were not usable.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        topic: str,
+        callback: Callable[[np.ndarray, str, Header], None],
+        *,
+        transport: str = 'raw',
+        group: CallbackGroup | None = None,
+    ):
+        """Subscribe.
+
+        Parameters
+        ----------
+        node, topic
+            Who subscribes to what.
+        callback
+            Called with (height, width[, 3]) uint8, its encoding and the header. A `FisheyeError`
+            that it raises drops the picture with a warning.
+        transport
+            'raw', or 'compressed' for the JPEG sub-topic.
+        group
+            Of the callback.
+        """
+        self.refused = 0
+        self._node = node
+        self._callback = callback
+        jpeg = transport == 'compressed'
+        self._convert = from_jpeg if jpeg else to_array
+        self._topic = f'{topic}/compressed' if jpeg else topic
+        self._subscription = node.create_subscription(
+            CompressedImage if jpeg else Image,
+            self._topic,
+            self._take,
+            IMAGE,
+            callback_group=group,
+            qos_overriding_options=ADJUSTABLE,
+        )
+
+    def _take(self, message) -> None:
+        try:
+            image, encoding = self._convert(message)
+            self._callback(image, encoding, message.header)
+        except FisheyeError as error:
+            self.refused += 1
+            self._node.get_logger().warning(
+                f'a picture on {self._topic} was dropped: {error}',
+                throttle_duration_sec=_WARNING_PAUSE_S,
+            )

@@ -1,0 +1,114 @@
+"""Corrects the pictures of one camera with cached maps."""
+
+from fisheye_bridge.background import Background
+from fisheye_bridge.camera_info import camera_of
+from fisheye_bridge.diagnostics import ERROR, WARN, Diagnostics
+from fisheye_bridge.images import ImageBuffer
+from fisheye_bridge.parameters import Parameters
+from fisheye_bridge.projection import projection_of
+from fisheye_bridge.qos import IMAGE, LATCHED
+from fisheye_bridge.running import run
+from fisheye_bridge.topics import ImageSubscription
+from fisheye_geometry.errors import FisheyeError
+from fisheye_geometry.image_circle import ImageCircle
+from fisheye_msgs.msg import Projection
+from rclpy.node import Node
+from sensor_msgs.msg import CameraInfo, Image
+
+from fisheye_undistort.correction import Correction
+from fisheye_undistort.settings import UndistortSettings
+
+
+class UndistortNode(Node):
+    """image_raw and camera_info to image_rect and projection."""
+
+    def __init__(self, **kwargs):
+        super().__init__('undistort', **kwargs)
+        self._background = Background(self._refuse)
+        self._camera_info = self._camera = self._circle = self._asked = None
+        self._correction = self._buffer = None
+        self._refusal = ''
+        self._frames = self._corrected = 0
+        self._parameters = Parameters(self, UndistortSettings, on_change=self._rebuild)
+        self._image = self.create_publisher(Image, 'image_rect', IMAGE)
+        self._projection = self.create_publisher(Projection, 'projection', LATCHED)
+        self.create_subscription(CameraInfo, 'camera_info', self._take_camera_info, IMAGE)
+        self._input = ImageSubscription(
+            self, 'image_raw', self._take_image, transport=self._parameters.settings.transport
+        )
+        self._diagnostics = Diagnostics(self, self._report)
+
+    def _take_camera_info(self, message):
+        """Have the maps rebuilt, but only if the camera is another one than before."""
+        content = (message.width, message.height, message.distortion_model, *message.k, *message.d)
+        if repr(content) == self._camera_info:
+            return
+        self._camera_info = repr(content)
+        try:
+            self._camera = camera_of(message)
+        except FisheyeError as error:
+            self._refuse(error)
+            return
+        self._header = message.header
+        self._circle = ImageCircle(self._camera.lens)
+        self._frames = 0
+        self._rebuild(self._parameters.settings)
+
+    def _rebuild(self, settings):
+        """Have the maps built in the background; frames use the old ones until then."""
+        if self._camera is None:
+            return
+        lens = self._camera.lens.seen_within(self._circle.angle_rad)
+        settings.surface_of(lens)
+        if (lens, settings) != self._asked:
+            self._asked = lens, settings
+            self._background.do(self._build, lens, settings)
+
+    def _build(self, lens, settings):
+        self._correction = Correction(lens, settings)
+        self._refusal = ''
+        self._projection.publish(projection_of(self._correction.surface, self._header))
+
+    def _refuse(self, error):
+        self._refusal = str(error)
+        kept = '; the last good calibration stays in use' if self._correction else ''
+        self.get_logger().warning(f'camera_info refused: {error}{kept}')
+
+    def _take_image(self, image, encoding, header):
+        self._look_for_circle(image)
+        correction = self._correction
+        if correction is None or not self._image.get_subscription_count():
+            return
+        surface = correction.surface
+        if self._buffer is None or not self._buffer.fits(surface.width, surface.height, encoding):
+            self._buffer = ImageBuffer(surface.width, surface.height, encoding)
+        correction(image, self._buffer.array)
+        self._buffer.message.header = header
+        self._image.publish(self._buffer.message)
+        self._corrected += 1
+
+    def _look_for_circle(self, image):
+        """Look where the lens's light ends; ever more seldom, since it does not change."""
+        self._frames += 1
+        power_of_two = self._frames & (self._frames - 1) == 0
+        if self._circle and power_of_two and self._circle.look(image):
+            self._rebuild(self._parameters.settings)
+
+    def _report(self, report):
+        if self._correction is None:
+            report.add(ERROR, self._refusal or 'waiting for camera_info')
+        elif self._refusal:
+            report.add(WARN, f'camera_info refused: {self._refusal}')
+        if self._input.refused:
+            report.values['pictures refused'] = self._input.refused
+        report.values['pictures corrected'] = self._corrected
+
+    def destroy_node(self):
+        """End the background work too."""
+        self._background.stop()
+        super().destroy_node()
+
+
+def main() -> int:
+    """Run the node."""
+    return run(UndistortNode)
