@@ -170,3 +170,20 @@ def from_jpeg(message: CompressedImage) -> tuple[np.ndarray, str]:
             f"{coded.size} bytes of format '{message.format:.40}' are no picture; expected JPEG or PNG"
         )
     return image, 'mono8' if grey else 'bgr8'
+
+
+_COLOR_CHANGES = {
+    ('rgb8', 'bgr8'): cv2.COLOR_RGB2BGR,
+    ('bgr8', 'rgb8'): cv2.COLOR_BGR2RGB,
+    ('mono8', 'bgr8'): cv2.COLOR_GRAY2BGR,
+    ('mono8', 'rgb8'): cv2.COLOR_GRAY2RGB,
+    ('bgr8', 'mono8'): cv2.COLOR_BGR2GRAY,
+    ('rgb8', 'mono8'): cv2.COLOR_RGB2GRAY,
+}
+
+
+def converted(image: np.ndarray, encoding: str, wanted: str) -> np.ndarray:
+    """Give a picture in another of the encodings in `CHANNELS`, itself if it is in that already."""
+    if encoding == wanted:
+        return image
+    return cv2.cvtColor(image, _COLOR_CHANGES[encoding, wanted])

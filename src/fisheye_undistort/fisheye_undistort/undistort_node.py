@@ -1,6 +1,6 @@
 """Corrects the pictures of one camera with cached maps."""
 
-from fisheye_bridge.background import Background
+from fisheye_geometry.background import Background
 from fisheye_bridge.camera_info import camera_of
 from fisheye_bridge.diagnostics import ERROR, WARN, Diagnostics
 from fisheye_bridge.images import ImageBuffer

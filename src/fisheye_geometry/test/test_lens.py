@@ -1,0 +1,108 @@
+"""Lenses: there and back, past 90 degrees, and nonsense refused."""
+
+import numpy as np
+import pytest
+from fisheye_geometry.errors import CalibrationError
+from fisheye_geometry.lens import make_lens
+
+EXACT_PX = 1e-6
+"""Rounding of float64 through a polynomial and its inverse stays far below it."""
+
+FISHEYE = make_lens(
+    'equidistant', 640, 480, [223.05, 0, 319.5, 0, 223.05, 239.5, 0, 0, 1],
+    [-0.02, 0.004, -0.001, 0.0001],
+)
+FOLDING = make_lens(
+    'fisheye', 1280, 960, [392.1, 0.4, 631.8, 0, 393.1, 493.2, 0, 0, 1],
+    [-0.1, 0.0, 0.0, 0.0],
+)
+PINHOLE = make_lens(
+    'plumb_bob', 640, 480, [400, 0, 310, 0, 405, 250, 0, 0, 1], [-0.3, 0.1, 0.001, -0.002, -0.01]
+)
+RATIONAL = make_lens(
+    'rational_polynomial', 640, 480, [400, 0, 320, 0, 400, 240, 0, 0, 1],
+    [0.5, 0.1, 0.001, 0, 0.01, 0.8, 0.2, 0.02],
+)
+PLAIN = make_lens('plumb_bob', 640, 480, [400, 0, 320, 0, 400, 240, 0, 0, 1], [])
+
+
+def pixels_around(lens):
+    x = np.linspace(-0.5, lens.width - 0.5, 161)
+    y = np.linspace(-0.5, lens.height - 0.5, 121)
+    return np.stack(np.meshgrid(x, y), axis=-1)
+
+
+@pytest.mark.parametrize('lens', [FISHEYE, FOLDING, PINHOLE, RATIONAL, PLAIN])
+def test_a_pixel_comes_back_from_its_ray(lens):
+    pixels = pixels_around(lens)
+    rays, seen = lens.unproject(pixels)
+    back, still_seen = lens.project(rays)
+    assert seen.mean() > 0.5
+    assert still_seen[seen].all()
+    assert np.abs(back - pixels)[seen].max() < EXACT_PX
+    assert np.linalg.norm(rays[seen], axis=-1) == pytest.approx(1)
+
+
+@pytest.mark.parametrize('lens', [FISHEYE, FOLDING])
+def test_rays_come_back_up_to_the_largest_angle(lens):
+    angle = np.linspace(0, lens.max_angle_rad - 1e-9, 2000)
+    for around in (0.0, 1.0, 4.0):
+        rays = np.stack(
+            [np.sin(angle) * np.cos(around), np.sin(angle) * np.sin(around), np.cos(angle)], -1
+        )
+        pixels, seen = lens.project(rays)
+        again, also_seen = lens.unproject(pixels)
+        assert seen.all()
+        assert also_seen.all()
+        assert np.abs(lens.project(again)[0] - pixels).max() < EXACT_PX
+    assert lens.max_angle_rad > np.pi / 2
+
+
+def test_a_lens_whose_radius_stops_growing_ends_there():
+    radii = FOLDING.project(
+        np.stack([np.sin(a := np.linspace(0, FOLDING.max_angle_rad, 500)), 0 * a, np.cos(a)], -1)
+    )[0][:, 0]
+    assert (np.diff(radii) > 0).all()
+    assert FOLDING.max_angle_rad < np.pi
+    _, seen = FOLDING.project(np.array([0.0, 0.0, -1.0]))
+    assert not seen
+
+
+def test_a_ray_behind_the_camera_is_not_mirrored_into_the_picture():
+    behind = np.radians(101)
+    pixel, seen = FISHEYE.project(np.array([np.sin(behind), 0.0, np.cos(behind)]))
+    assert seen
+    assert pixel[0] > FISHEYE.width
+
+
+def test_the_image_circle_limits_what_is_seen():
+    lens = FISHEYE.seen_within(np.radians(60))
+    _, seen = lens.project(np.array([[np.sin(1.0), 0, np.cos(1.0)], [np.sin(1.1), 0, np.cos(1.1)]]))
+    assert seen.tolist() == [True, False]
+    assert lens.angle_at(-0.5, 239.5) == pytest.approx(np.radians(60))
+
+
+def test_the_field_of_view_across_the_picture():
+    lens = make_lens('equidistant', 640, 480, [215.7, 0, 319.5, 0, 215.7, 239.5, 0, 0, 1], [0] * 4)
+    assert lens.angle_at(-0.5, 239.5) == pytest.approx(320 / 215.7)
+
+
+@pytest.mark.parametrize(
+    ('change', 'words'),
+    [
+        ({'model': 'omnidirectional'}, 'omnidirectional.*expected one of equidistant'),
+        ({'width': 0}, 'width is 0 px; expected 1 to'),
+        ({'matrix': [0, 0, 1, 0, 1, 1, 0, 0, 1]}, 'focal_x_px is 0.0; expected'),
+        ({'matrix': [1, 0, 1, 0, float('nan'), 1, 0, 0, 1]}, 'focal_y_px is nan; expected'),
+        ({'matrix': [1, 0, float('inf'), 0, 1, 1, 0, 0, 1]}, 'must be finite numbers; found inf'),
+        ({'distortion': [0.1, 0.2]}, '2 distortion coefficients; .*equidistant.* has 4'),
+        ({'distortion': [0.1, 0.2, float('nan'), 0]}, 'finite numbers; found nan'),
+    ],
+)
+def test_numbers_that_describe_no_lens_are_refused(change, words):
+    good = {
+        'model': 'equidistant', 'width': 640, 'height': 480,
+        'matrix': [200, 0, 320, 0, 200, 240, 0, 0, 1], 'distortion': [0, 0, 0, 0],
+    }
+    with pytest.raises(CalibrationError, match=words):
+        make_lens(**{**good, **change})

@@ -1,0 +1,171 @@
+"""What stitch_node and panorama_node share: parameters, service, and the published panorama."""
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import asdict
+from math import degrees, nan
+
+import numpy as np
+from fisheye_bridge.diagnostics import ERROR, WARN, Diagnostics, Report
+from fisheye_bridge.images import ImageBuffer, converted
+from fisheye_bridge.parameters import Parameters
+from fisheye_bridge.projection import projection_of
+from fisheye_bridge.qos import LATCHED
+from fisheye_bridge.topics import ImagePublisher
+from fisheye_geometry.errors import FisheyeError, SettingError
+from fisheye_msgs.msg import Overlap, Overlaps, Particle, Projection
+from fisheye_msgs.srv import CalibrateOverlap
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.node import Node
+from rclpy.time import Time
+from std_msgs.msg import Header
+
+from panorama_stitch import overlap
+from panorama_stitch.compositor import Compositor
+from panorama_stitch.live import LiveStitcher
+from panorama_stitch.settings import PanoramaOutputSettings
+
+FRAME_ID = 'panorama_optical_frame'
+_WARNING_PAUSE_S = 5.0
+_LATENCIES = 300
+
+
+class PanoramaBase(Node):
+    """A node that publishes panoramas; where the frames come from is the business of others."""
+
+    def __init__(self, name: str, settings: type[PanoramaOutputSettings], **kwargs):
+        super().__init__(name, **kwargs)
+        self._parameters = Parameters(self, settings, on_change=self._apply)
+        cameras = self.settings.cameras
+        if len(set(cameras)) != len(cameras) or len(cameras) < 2:
+            raise SettingError(f'cameras is {list(cameras)}; expected at least two different names')
+        self._buffer: ImageBuffer | None = None
+        self._encoding = ''
+        self._published = 0
+        self._latencies_ms: deque[float] = deque(maxlen=_LATENCIES)
+        self._image = ImagePublisher(self, 'panorama/image')
+        self._projection = self.create_publisher(Projection, 'panorama/projection', LATCHED)
+        self._overlaps = self.create_publisher(Overlaps, 'panorama/overlap', LATCHED)
+        self.live = LiveStitcher(
+            self.settings, publish=self._publish, changed=self._announce, warn=self._warn
+        )
+        self.create_service(
+            CalibrateOverlap,
+            'calibrate_overlap',
+            self._calibrate,
+            callback_group=MutuallyExclusiveCallbackGroup(),
+        )
+        self._diagnostics = Diagnostics(self, self._report)
+
+    @property
+    def settings(self) -> PanoramaOutputSettings:
+        """The current values of the parameters."""
+        return self._parameters.settings
+
+    def take(self, camera: str, stamp_ns: int, image: np.ndarray, encoding: str) -> None:
+        """Take a frame of a camera; the first one decides the panorama's encoding."""
+        self._encoding = self._encoding or encoding
+        self.live.take(camera, stamp_ns, converted(image, encoding, self._encoding))
+
+    def destroy_node(self) -> None:
+        """End the threads too."""
+        self.live.stop()
+        super().destroy_node()
+
+    def _apply(self, settings: PanoramaOutputSettings) -> None:
+        self.live.apply(settings)
+
+    def _publish(self, compositor: Compositor, images: Sequence[np.ndarray], stamp_ns: int):
+        if not self._image.wanted:
+            return
+        surface = compositor.layout.surface
+        size = surface.width, surface.height, self._encoding
+        if self._buffer is None or not self._buffer.fits(*size):
+            self._buffer = ImageBuffer(*size)
+        compositor.compose(images, self._buffer.array)
+        self._buffer.message.header = _header(stamp_ns)
+        self._image.publish(self._buffer.message, self._buffer.array, self.settings.jpeg_quality)
+        self._published += 1
+        self._latencies_ms.append((self.get_clock().now().nanoseconds - stamp_ns) / 1e6)
+
+    def _announce(self) -> None:
+        """Publish what is in use now, for those who come later too."""
+        header = _header(self.get_clock().now().nanoseconds)
+        surface = self.live.compositor.layout.surface
+        self._projection.publish(projection_of(surface, header))
+        in_use = self.live.stitcher.in_use(self.settings)
+        self._overlaps.publish(Overlaps(header=header, overlaps=self._messages(in_use)))
+
+    def _calibrate(self, request, response):
+        try:
+            if request.method not in ('', *overlap.METHODS):
+                raise SettingError(
+                    f"method is '{request.method}'; expected one of {', '.join(overlap.METHODS)}"
+                )
+            measured = self.live.calibrate(request.method, request.save).result()
+        except FisheyeError as error:
+            response.success, response.message = False, str(error)
+            return response
+        response.success = True
+        response.message = '; '.join(result.message for result in measured)
+        response.overlaps = self._messages(measured)
+        return response
+
+    def _messages(self, results: Sequence[overlap.Overlap]) -> list[Overlap]:
+        cameras, surfaces = self.settings.cameras, self.live.stitcher.surfaces
+        return [
+            _overlap_message(result, names, surface)
+            for result, names, surface in zip(
+                results, zip(cameras, cameras[1:], strict=False), surfaces, strict=False
+            )
+        ]
+
+    def _warn(self, sentence: str) -> None:
+        self.get_logger().warning(sentence, throttle_duration_sec=_WARNING_PAUSE_S)
+
+    def _report(self, report: Report) -> None:
+        if self.live.compositor is None:
+            report.add(ERROR, 'no panorama yet: waiting for frames of every camera')
+        else:
+            for result in self.live.stitcher.in_use(self.settings):
+                if not result.found:
+                    report.add(WARN, 'no overlap: frames are side by side')
+        report.values['panoramas published'] = self._published
+        report.values['pairs overtaken'] = self.live.dropped
+        for camera, count in self.live.pairing.unpaired.items():
+            report.values[f'{camera} unpaired'] = count
+        skews_ms = np.array(self.live.pairing.skews_ns) / 1e6
+        if len(skews_ms):
+            report.values['skew median ms'] = float(np.median(skews_ms))
+            report.values['skew worst ms'] = float(skews_ms.max())
+        if self._latencies_ms:
+            for share in (50, 95, 99):
+                value = float(np.percentile(self._latencies_ms, share))
+                report.values[f'latency p{share} ms'] = value
+
+
+def _header(stamp_ns: int) -> Header:
+    return Header(stamp=Time(nanoseconds=stamp_ns).to_msg(), frame_id=FRAME_ID)
+
+
+def _overlap_message(result: overlap.Overlap, names, surface) -> Overlap:
+    """Describe an overlap; the angle is that between the two optical axes on this surface."""
+    angle = degrees(result.offset_x_px / surface.focal_px) if surface.turns_are_shifts else nan
+    return Overlap(
+        left_camera=names[0],
+        right_camera=names[1],
+        method=result.method,
+        found=result.found,
+        offset_x_px=result.offset_x_px,
+        offset_y_px=result.offset_y_px,
+        offset_deg=angle,
+        pitch_deg=degrees(result.turn.pitch_rad),
+        roll_deg=degrees(result.turn.roll_rad),
+        overlap_px=result.overlap_px,
+        confidence=result.confidence,
+        min_correlation_value=result.min_correlation_value,
+        left_particles=[Particle(**asdict(particle)) for particle in result.left_particles],
+        right_particles=[Particle(**asdict(particle)) for particle in result.right_particles],
+        left_match=result.left_match,
+        right_match=result.right_match,
+    )

@@ -1,0 +1,79 @@
+"""Settings of the two nodes that make panoramas: the only place with their defaults."""
+
+from dataclasses import dataclass
+from math import nan
+
+from fisheye_capture.settings import FrameSettings
+from fisheye_geometry.settings import setting
+from fisheye_undistort.settings import SurfaceSettings
+
+from panorama_stitch.compositor import BLENDS
+from panorama_stitch.layout import CROPS
+from panorama_stitch.overlap import OverlapSettings
+
+
+@dataclass(frozen=True)
+class PanoramaOutputSettings(OverlapSettings):
+    """What both nodes that make panoramas can be told."""
+
+    cameras: tuple[str, ...] = setting(
+        ('left', 'right'), 'Names of the cameras, from left to right: the namespaces of their topics.'
+    )
+    auto_calibrate: bool = setting(
+        True, 'Measure the overlap on the first good pair of frames.', live=True
+    )
+    offset_x_px: tuple[float, ...] = setting(
+        (nan,),
+        'Offset set by hand, px, one number for each neighbouring pair; NaN: measured.',
+        nan=True,
+        live=True,
+    )
+    offset_y_px: tuple[float, ...] = setting(
+        (nan,),
+        'Vertical offset set by hand, px, one number for each neighbouring pair; NaN: measured.',
+        nan=True,
+        live=True,
+    )
+    overlap_file: str = setting('', 'YAML file with the overlap: read at start, written on request.')
+    blend: str = setting(
+        'feather',
+        'How neighbouring views meet: none lays the right over the left as published, feather fades.',
+        choices=BLENDS,
+        live=True,
+    )
+    feather_deg: float = setting(
+        4.0, 'Width of the fade at a seam.', minimum=0.1, maximum=60.0, live=True
+    )
+    crop: str = setting(
+        'valid',
+        'valid keeps the rows and columns that hold a picture everywhere, none keeps all.',
+        choices=CROPS,
+        live=True,
+    )
+    max_pair_skew_s: float = setting(
+        0.05,
+        'Frames whose stamps differ by more are no pair.',
+        minimum=0.0,
+        maximum=10.0,
+        live=True,
+    )
+    stale_after_s: float = setting(
+        0.5,
+        'A camera that gave no frame for so long is stale.',
+        minimum=0.05,
+        maximum=60.0,
+        live=True,
+    )
+    jpeg_quality: int = setting(
+        80, 'Quality of the compressed panorama.', minimum=1, maximum=100, live=True
+    )
+
+
+@dataclass(frozen=True)
+class StitchSettings(PanoramaOutputSettings):
+    """Settings of the stitch node."""
+
+
+@dataclass(frozen=True)
+class PanoramaSettings(PanoramaOutputSettings, SurfaceSettings, FrameSettings):
+    """Settings of the panorama node; those of each camera are `CameraSettings` behind its name."""
