@@ -1,0 +1,54 @@
+"""CameraInfo: there and back, and what is no calibration refused."""
+
+import pytest
+from fisheye_bridge.camera_info import camera_info_of, camera_of
+from fisheye_bridge.projection import projection_of, surface_of
+from fisheye_geometry.camera_file import Camera
+from fisheye_geometry.errors import CalibrationError, GeometryError
+from fisheye_geometry.lens import make_lens
+from fisheye_geometry.surface import Surface
+from fisheye_msgs.msg import Projection
+from std_msgs.msg import Header
+
+LENS = make_lens('equidistant', 640, 480, [223, 0, 319, 0, 224, 239, 0, 0, 1], [0.1, 0, 0, 0])
+
+
+def test_a_camera_comes_back():
+    message = camera_info_of(Camera('left', LENS), Header(frame_id='here'))
+    assert (message.distortion_model, message.header.frame_id) == ('equidistant', 'here')
+    assert message.p[:4].tolist() == [223, 0, 319, 0]
+    again = camera_of(message, 'left')
+    assert again.lens == LENS
+    assert camera_info_of(again, message.header) == message
+
+
+@pytest.mark.parametrize(
+    ('change', 'words'),
+    [
+        ({'k': [0.0] * 9}, 'not calibrated'),
+        ({'binning_x': 2}, 'binning is 2x0'),
+        ({'distortion_model': 'unheard'}, "'unheard' is not known"),
+        ({'d': [0.1]}, '1 distortion coefficients'),
+        ({'width': 0}, 'width is 0 px'),
+    ],
+)
+def test_what_is_no_calibration_is_refused(change, words):
+    message = camera_info_of(Camera('left', LENS), Header())
+    for name, value in change.items():
+        setattr(message, name, value)
+    with pytest.raises(CalibrationError, match=words):
+        camera_of(message)
+
+
+def test_a_cropped_camera_is_refused():
+    message = camera_info_of(Camera('left', LENS), Header())
+    message.roi.width, message.roi.height = 320, 240
+    with pytest.raises(CalibrationError, match='roi is 320x240 px'):
+        camera_of(message)
+
+
+def test_a_surface_comes_back():
+    surface = Surface('cylindrical', 662, 872, 223.05, 330.4, 435.5)
+    assert surface_of(projection_of(surface, Header())) == surface
+    with pytest.raises(GeometryError, match="surface '' is not known"):
+        surface_of(Projection())

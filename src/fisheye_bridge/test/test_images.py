@@ -1,0 +1,162 @@
+"""Images: every encoding, padding, no copy where none is needed, and nonsense refused."""
+
+import cv2
+import numpy as np
+import pytest
+from fisheye_bridge.images import (
+    CHANNELS,
+    ImageBuffer,
+    converted,
+    from_jpeg,
+    to_array,
+    to_jpeg,
+    to_message,
+)
+from fisheye_geometry.errors import ImageFormatError
+from sensor_msgs.msg import CompressedImage, Image
+from std_msgs.msg import Header
+
+COLORS = np.zeros((8, 12, 3), np.uint8)
+COLORS[:, :6] = (200, 90, 40)
+COLORS[:, 6:] = (30, 180, 220)
+CHROMA_LEVELS = 6
+"""Conversion to YUV and back rounds twice."""
+
+
+def message_of(pixels, encoding, padding=0):
+    rows = pixels.reshape(len(pixels), -1)
+    padded = np.pad(rows, ((0, 0), (0, padding)), constant_values=99)
+    channels = pixels.shape[2] if pixels.ndim == 3 else 1
+    message = Image(
+        width=rows.shape[1] // channels, height=len(rows), encoding=encoding, step=padded.shape[1]
+    )
+    message.data.frombytes(padded.tobytes())
+    return message
+
+
+def mosaic(pattern):
+    """Sample COLORS through a Bayer pattern named by its first two rows."""
+    out = np.empty(COLORS.shape[:2], np.uint8)
+    for index, color in enumerate(pattern):
+        y, x = divmod(index, 2)
+        out[y::2, x::2] = COLORS[y::2, x::2, 'bgr'.index(color)]
+    return out
+
+
+def yuv(order):
+    """Pack COLORS as 4:2:2."""
+    y, u, v = cv2.split(cv2.cvtColor(COLORS, cv2.COLOR_BGR2YUV))
+    # OpenCV's plain YUV is full range; cameras send luma 16 to 235 and chroma scaled alike.
+    y, u, v = 16 + y * (219 / 255), *(128 + (c - 128.0) * s for c, s in ((u, 1.02), (v, 0.81)))
+    packed = np.empty((*y.shape, 2), np.uint8)
+    chroma, luma = ((1, 0) if order == 'yuyv' else (0, 1))
+    packed[..., luma] = np.rint(y)
+    packed[:, 0::2, chroma] = np.rint(u[:, 0::2])
+    packed[:, 1::2, chroma] = np.rint(v[:, 0::2])
+    return packed
+
+
+@pytest.mark.parametrize('padding', [0, 5])
+@pytest.mark.parametrize('encoding', CHANNELS)
+def test_working_encodings_are_the_messages_own_memory(encoding, padding):
+    pixels = COLORS[..., 0] if encoding == 'mono8' else COLORS
+    message = message_of(pixels, encoding, padding)
+    array, name = to_array(message)
+    assert name == encoding
+    assert (array == pixels).all()
+    assert np.shares_memory(array, np.frombuffer(message.data, np.uint8))
+
+
+@pytest.mark.parametrize('padding', [0, 3])
+@pytest.mark.parametrize('encoding', ['bgra8', 'rgba8'])
+def test_alpha_is_dropped(encoding, padding):
+    pixels = cv2.cvtColor(
+        COLORS, cv2.COLOR_BGR2BGRA if encoding == 'bgra8' else cv2.COLOR_BGR2RGBA
+    )
+    array, name = to_array(message_of(pixels, encoding, padding))
+    assert name == 'bgr8'
+    assert (array == COLORS).all()
+
+
+@pytest.mark.parametrize('pattern', ['rggb', 'bggr', 'gbrg', 'grbg'])
+def test_bayer_patterns_give_the_colors_back(pattern):
+    array, name = to_array(message_of(mosaic(pattern), f'bayer_{pattern}8', padding=2))
+    assert name == 'bgr8'
+    assert (array[2:-2, 2:4] == COLORS[2:-2, 2:4]).all()
+    assert (array[2:-2, -4:-2] == COLORS[2:-2, -4:-2]).all()
+
+
+@pytest.mark.parametrize(
+    ('encoding', 'order'),
+    [('yuv422_yuy2', 'yuyv'), ('yuyv', 'yuyv'), ('uyvy', 'uyvy'), ('yuv422', 'uyvy')],
+)
+def test_shared_chroma(encoding, order):
+    array, name = to_array(message_of(yuv(order), encoding, padding=4))
+    assert name == 'bgr8'
+    assert np.abs(array.astype(int) - COLORS).max() <= CHROMA_LEVELS
+
+
+@pytest.mark.parametrize(
+    ('change', 'words'),
+    [
+        ({'encoding': 'mono16'}, "'mono16' is not taken; expected one of bgr8, rgb8"),
+        ({'encoding': ''}, "'' is not taken"),
+        ({'width': 0}, '0x8 px in bgr8; expected sides of 1 to'),
+        ({'height': 2**31}, '12x2147483648 px in bgr8; expected sides'),
+        ({'width': 13}, 'rows of 36 bytes; expected 39'),
+        ({'height': 9}, 'has 288 bytes; expected 324'),
+        ({'step': 0}, 'rows of 0 bytes; expected 36'),
+        ({'encoding': 'yuyv', 'width': 11}, '11x8 px in yuyv; .* even size'),
+        ({'encoding': 'bayer_rggb8', 'height': 7}, '12x7 px in bayer_rggb8; .* even size'),
+    ],
+)
+def test_what_cannot_be_is_refused_by_name(change, words):
+    message = message_of(COLORS, 'bgr8')
+    for name, value in change.items():
+        setattr(message, name, value)
+    with pytest.raises(ImageFormatError, match=words):
+        to_array(message)
+
+
+@pytest.mark.parametrize('encoding', CHANNELS)
+def test_a_message_holds_what_was_put_in(encoding):
+    pixels = COLORS[..., 0] if encoding == 'mono8' else COLORS
+    header = Header(frame_id='left_optical_frame')
+    message = to_message(pixels[:, 2:9], encoding, header)
+    assert message.header == header
+    array, name = to_array(message)
+    assert name == encoding
+    assert (array == pixels[:, 2:9]).all()
+
+
+def test_a_buffer_is_its_message():
+    buffer = ImageBuffer(12, 8, 'bgr8')
+    buffer.array[:] = COLORS
+    assert (to_array(buffer.message)[0] == COLORS).all()
+    assert buffer.fits(12, 8, 'bgr8')
+    assert not buffer.fits(12, 8, 'rgb8')
+
+
+@pytest.mark.parametrize(
+    ('encoding', 'form'),
+    [
+        ('bgr8', 'bgr8; jpeg compressed bgr8'),
+        ('rgb8', 'rgb8; jpeg compressed bgr8'),
+        ('mono8', 'mono8; jpeg compressed '),
+    ],
+)
+def test_jpeg_is_what_image_transport_reads(encoding, form):
+    message = to_jpeg(converted(COLORS, 'bgr8', encoding), encoding, Header(), 95)
+    assert message.format == form
+    array, name = from_jpeg(message)
+    assert name == ('mono8' if encoding == 'mono8' else 'bgr8')
+    expected = converted(COLORS, 'bgr8', name)
+    assert np.abs(array[:, 1:5].astype(int) - expected[:, 1:5]).max() <= CHROMA_LEVELS
+
+
+@pytest.mark.parametrize('data', [b'', b'no picture', b'\xff\xd8\xff'])
+def test_broken_jpeg_is_refused(data):
+    message = CompressedImage(format='jpeg')
+    message.data.frombytes(data)
+    with pytest.raises(ImageFormatError, match=f"{len(data)} bytes of format 'jpeg' are no picture"):
+        from_jpeg(message)

@@ -1,0 +1,114 @@
+"""Parameters: declared with descriptors, forgiving where it is clear, refused by name elsewhere."""
+
+from dataclasses import dataclass
+from math import isnan, nan
+
+import pytest
+import rclpy
+from fisheye_bridge.parameters import Parameters
+from fisheye_geometry.errors import OverlapError, SettingError
+from fisheye_geometry.settings import setting
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+
+@dataclass(frozen=True)
+class Example:
+    """One setting of each kind."""
+
+    rate_hz: float = setting(30.0, 'Frames a second.', minimum=0.1, maximum=1000.0, live=True)
+    source: str = setting('synthetic', 'Where pictures come from.')
+    blend: str = setting('feather', 'How.', choices=('none', 'feather'), live=True)
+    offset_px: tuple[float, ...] = setting((nan,), 'Offset.', nan=True, live=True)
+
+
+@pytest.fixture
+def make_node():
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    nodes = []
+
+    def make(**overrides):
+        given = [Parameter(name, value=value) for name, value in overrides.items()]
+        node = Node(f'parameters_{len(nodes)}', context=context, parameter_overrides=given)
+        nodes.append(node)
+        return node
+
+    yield make
+    for node in nodes:
+        node.destroy_node()
+    rclpy.shutdown(context=context)
+
+
+def test_defaults_and_descriptors(make_node):
+    node = make_node()
+    settings = Parameters(node, Example).settings
+    assert (settings.rate_hz, settings.source, settings.blend) == (30.0, 'synthetic', 'feather')
+    assert isnan(settings.offset_px[0])
+    rate = node.describe_parameter('rate_hz')
+    assert rate.description == 'Frames a second.'
+    assert (rate.floating_point_range[0].from_value, rate.read_only) == (0.1, False)
+    assert node.describe_parameter('source').read_only
+    assert node.describe_parameter('blend').additional_constraints == 'one of none, feather'
+
+
+def test_what_is_clear_is_taken(make_node):
+    settings = Parameters(make_node(rate_hz=15, source=0, offset_px=545), Example).settings
+    assert (settings.rate_hz, settings.source, settings.offset_px) == (15.0, '0', (545.0,))
+
+
+@pytest.mark.parametrize(
+    ('overrides', 'words'),
+    [
+        ({'rate_hz': 5000.0}, 'rate_hz.*1000.*5000'),
+        ({'rate_hz': 5000}, 'rate_hz is 5000; expected 0.1 to 1000'),
+        ({'rate_hz': 'fast'}, "rate_hz is 'fast'; expected a number"),
+        ({'blend': 'soft'}, "blend is 'soft'; expected one of none, feather"),
+    ],
+)
+def test_a_bad_start_is_refused_by_name(make_node, overrides, words):
+    with pytest.raises(SettingError, match=words):
+        Parameters(make_node(**overrides), Example)
+
+
+def change(node, name, value):
+    return node.set_parameters([Parameter(name, value=value)])[0]
+
+
+def test_live_changes_apply_and_bad_ones_do_not(make_node):
+    node, seen = make_node(), []
+    parameters = Parameters(node, Example, on_change=lambda new: seen.append(new.blend))
+    assert change(node, 'blend', 'none').successful
+    assert parameters.settings.blend == 'none'
+    for name, value, words in [
+        ('blend', 'soft', "'soft'; expected one of"),
+        ('rate_hz', 0, '0; expected 0.1 to 1000'),
+        ('source', 'x', 'read-only'),
+    ]:
+        result = change(node, name, value)
+        assert not result.successful
+        assert words in result.reason
+    assert parameters.settings.rate_hz == 30.0
+    assert seen == ['none']
+    assert change(node, 'offset_px', nan).successful
+    assert seen == ['none'], 'NaN for NaN is no change'
+
+
+def test_the_node_may_refuse_with_a_sentence(make_node):
+    def refuse(settings):
+        raise OverlapError('that does not fit')
+
+    node = make_node()
+    parameters = Parameters(node, Example, on_change=refuse)
+    assert change(node, 'blend', 'none').reason == 'that does not fit'
+    assert parameters.settings.blend == 'feather'
+
+
+def test_prefixes_keep_two_sets_apart(make_node):
+    node = make_node(**{'left.source': 'a.png'})
+    left = Parameters(node, Example, prefix='left.')
+    right = Parameters(node, Example, prefix='right.', rate_hz=10.0)
+    assert (left.settings.source, right.settings.source) == ('a.png', 'synthetic')
+    assert right.settings.rate_hz == 10.0
+    assert change(node, 'left.blend', 'none').successful
+    assert (left.settings.blend, right.settings.blend) == ('none', 'feather')

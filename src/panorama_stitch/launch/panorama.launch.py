@@ -1,0 +1,86 @@
+"""From two cameras to a panorama: five nodes, or one with `composed:=true`.
+
+Across a link the same file starts both halves: `robot:=true` the captures, `base:=true` the rest.
+"""
+
+from pathlib import Path
+
+from ament_index_python.packages import get_package_share_directory
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironmentVariable
+from launch_ros.actions import Node
+
+CONFIG = Path(get_package_share_directory('panorama_stitch')) / 'config'
+CAMERAS = ('left', 'right')
+ARGUMENTS = {
+    'composed': ('false', 'one process from cameras to panorama instead of five nodes'),
+    'robot': ('false', 'only the captures, on the robot'),
+    'base': ('false', 'only undistort and stitch, at the other end of the link'),
+    'params_file': (str(CONFIG / 'panorama.yaml'), 'parameters that differ from the defaults'),
+    'transport': ('', 'how undistort gets its pictures: raw or compressed'),
+    'frame_rate_hz': ('', 'frames a second of each camera'),
+    'overlap_file': ('', 'where the overlap is read at start and saved on request'),
+    'left_source': ('', 'what the left camera is: device, picture, folder, video or URL'),
+    'right_source': ('', 'what the right camera is'),
+    'left_camera_info_url': ('', 'calibration file of the left camera'),
+    'right_camera_info_url': ('', 'calibration file of the right camera'),
+}
+
+
+def nodes(context):
+    """Say which nodes to start; an argument that was not given leaves the parameter alone."""
+    arguments = context.launch_configurations
+
+    def parameters(**names):
+        given = {name: arguments[argument] for name, argument in names.items()}
+        return [arguments['params_file'], {name: text for name, text in given.items() if text}]
+
+    def node(package, executable, name, namespace='', **names):
+        return Node(
+            package=package,
+            executable=executable,
+            name=name,
+            namespace=namespace,
+            parameters=parameters(**names),
+            output='screen',
+        )
+
+    if arguments['composed'] == 'true':
+        own = {
+            f'{camera}.{name}': f'{camera}_{name}'
+            for camera in CAMERAS
+            for name in ('source', 'camera_info_url')
+        }
+        shared = {name: name for name in ('frame_rate_hz', 'overlap_file')}
+        return [node('panorama_stitch', 'panorama_node', 'panorama', **own, **shared)]
+    captures = [
+        node(
+            'fisheye_capture',
+            'capture_node',
+            'capture',
+            camera,
+            source=f'{camera}_source',
+            camera_info_url=f'{camera}_camera_info_url',
+            frame_rate_hz='frame_rate_hz',
+        )
+        for camera in CAMERAS
+    ]
+    rest = [
+        node('fisheye_undistort', 'undistort_node', 'undistort', camera, transport='transport')
+        for camera in CAMERAS
+    ]
+    rest.append(node('panorama_stitch', 'stitch_node', 'stitch', overlap_file='overlap_file'))
+    robot, base = (arguments[half] == 'true' for half in ('robot', 'base'))
+    return (captures if robot or not base else []) + (rest if base or not robot else [])
+
+
+def generate_launch_description():
+    """Start what the arguments say, with the profile without which large images get lost."""
+    return LaunchDescription([
+        *(
+            DeclareLaunchArgument(name, default_value=value, description=text)
+            for name, (value, text) in ARGUMENTS.items()
+        ),
+        SetEnvironmentVariable('FASTRTPS_DEFAULT_PROFILES_FILE', str(CONFIG / 'fastdds.xml')),
+        OpaqueFunction(function=nodes),
+    ])
