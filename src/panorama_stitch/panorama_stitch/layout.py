@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+import cv2
 import numpy as np
 from fisheye_geometry.surface import Surface
 
@@ -126,7 +127,7 @@ def _cropped(layout: Layout, views: Sequence[View]) -> Layout:
 
 
 def covered(layout: Layout, views: Sequence[View]) -> np.ndarray:
-    """(height, width) bool: where the panorama shows anything."""
+    """(height, width) bool: where the panorama surely shows something."""
     shape = (layout.surface.height, layout.surface.width)
     shown = np.zeros(shape, bool)
     for index, (view, origin) in enumerate(zip(views, layout.origins, strict=True)):
@@ -135,6 +136,10 @@ def covered(layout: Layout, views: Sequence[View]) -> np.ndarray:
         end = layout.seams[index].end if index < len(layout.seams) else end
         x, y = round(origin.x_px), round(origin.y_px)
         valid = view.valid()
+        if (x, y) != origin:
+            # Drawn between its pixels, a view may lack the outermost ones.
+            inner = np.ones((3, 3), np.uint8)
+            valid = cv2.erode(valid.astype(np.uint8), inner, borderValue=0).astype(bool)
         begin, end = max(begin, x), min(end, x + valid.shape[1])
         top, bottom = max(0, y), min(shape[0], y + valid.shape[0])
         shown[top:bottom, begin:end] |= valid[top - y : bottom - y, begin - x : end - x]

@@ -182,8 +182,6 @@ class LiveStitcher:
             if not found:
                 self._prepare_at = monotonic() + self._pause_s
                 self._pause_s = min(2 * self._pause_s, _LONGEST_PAUSE_S)
-            if self.compositor and not found and measured == self.stitcher.overlaps:
-                return
             self.stitcher.overlaps = measured
         self._use(images)
 

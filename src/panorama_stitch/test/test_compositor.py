@@ -1,0 +1,178 @@
+"""Layout and composing, against the scene drawn directly on the panorama's surface."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from fisheye_capture.scene import Scene
+from fisheye_geometry.errors import ImageFormatError
+from fisheye_geometry.lens import make_lens
+from fisheye_geometry.remap import Turn
+from fisheye_geometry.surface import surface_for
+from panorama_stitch.compositor import Compositor
+from panorama_stitch.layout import covered, lay_out
+from panorama_stitch.view import View
+
+YAW = np.radians(140)
+STAMP_NS = 700_000_000
+FAITHFUL_DB = 30.0
+"""Two bilinear resamplings of an antialiased scene stay well above it."""
+LENS = make_lens(
+    'equidistant', 320, 240, [111.526, 0, 159.5, 0, 111.526, 119.5, 0, 0, 1],
+    [-0.02, 0.004, -0.001, 0.0001],
+).seen_within(np.radians(92))
+SURFACE = surface_for(LENS)
+OFFSET = YAW * SURFACE.focal_px
+
+
+@pytest.fixture(scope='module')
+def pictures():
+    return [
+        Scene().view(LENS, Turn(yaw_rad=yaw)).frame(STAMP_NS) for yaw in (-YAW / 2, YAW / 2)
+    ]
+
+
+def views_of(pictures, corrected):
+    """Both ways to the same panorama: raw pictures, or pictures that were corrected before."""
+    if not corrected:
+        return [View(LENS, SURFACE)] * 2, pictures
+    images = [View(LENS, SURFACE).corrected(picture) for picture in pictures]
+    return [View(SURFACE, SURFACE, seen=image.any(axis=2)) for image in images], images
+
+
+def composed(views, images, offset_px=OFFSET, fade_px=10.0, crop='valid'):
+    layout = lay_out(views, [(offset_px, 0.0)], fade_px=fade_px, crop=crop)
+    out = np.full((layout.surface.height, layout.surface.width, 3), 77, np.uint8)
+    Compositor(layout, views).compose(images, out)
+    return layout, out
+
+
+def psnr(a, b, where):
+    return 10 * np.log10(255**2 / np.mean((a.astype(float) - b)[where] ** 2))
+
+
+@pytest.mark.parametrize('corrected', [False, True])
+@pytest.mark.parametrize('fade_px', [0.0, 10.0])
+def test_it_shows_the_scene(pictures, corrected, fade_px):
+    views, images = views_of(pictures, corrected)
+    offset = round(OFFSET) if corrected else OFFSET
+    layout, out = composed(views, images, offset, fade_px, crop='none')
+    truth = Scene().view(layout.surface).frame(STAMP_NS)
+    valid = covered(layout, views)
+    assert valid.mean() > 0.7
+    assert psnr(out, truth, valid) > FAITHFUL_DB
+    outside = cv2.erode((~valid).astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+    assert (out[outside] == 0).all()
+
+
+@pytest.mark.parametrize('corrected', [False, True])
+def test_a_crop_leaves_no_black_and_keeps_the_field_of_view(pictures, corrected):
+    views, images = views_of(pictures, corrected)
+    layout, out = composed(views, images, round(OFFSET))
+    assert covered(layout, views).all()
+    assert out.any(axis=2).all()
+    shown_deg = np.degrees(layout.surface.width / layout.surface.focal_px)
+    assert shown_deg > 310 - 2 * 3.0
+    assert layout.surface.height > 1.8 * layout.surface.focal_px
+
+
+def test_both_ways_give_the_same_picture(pictures):
+    raw = composed(*views_of(pictures, corrected=False), offset_px=round(OFFSET), crop='none')[1]
+    rect = composed(*views_of(pictures, corrected=True), offset_px=round(OFFSET), crop='none')[1]
+    # Corrected pictures mark black pixels that are seen with a 1.
+    assert np.abs(raw.astype(int) - rect).max() <= 2
+
+
+def test_the_center_lies_midway_between_the_axes(pictures):
+    views, images = views_of(pictures, corrected=False)
+    layout, _ = composed(views, images, crop='none')
+    axes = [origin.x_px + SURFACE.center_x_px for origin in layout.origins]
+    assert layout.surface.center_x_px == pytest.approx(np.mean(axes))
+    assert axes[1] - axes[0] == pytest.approx(OFFSET)
+
+
+def test_none_lays_the_right_frame_over_the_left(pictures):
+    views, images = views_of(pictures, corrected=True)
+    x = round(OFFSET)
+    _, out = composed(views, images, x, fade_px=0.0, crop='none')
+    assert (out[:, :x] == images[0][:, :x]).all()
+    assert (out[:, x:] == images[1]).all()
+
+
+def test_frames_without_overlap_stand_side_by_side(pictures):
+    views, images = views_of(pictures, corrected=True)
+    layout, out = composed(views, images, SURFACE.width, crop='none')
+    assert (out == np.hstack(images)).all()
+    assert layout.seams[0].begin == layout.seams[0].end == SURFACE.width
+
+
+def test_a_vertical_offset_moves_the_right_frame_down(pictures):
+    views, images = views_of(pictures, corrected=True)
+    layout = lay_out(views, [(SURFACE.width, 7.0)], fade_px=0.0, crop='none')
+    out = np.empty((layout.surface.height, layout.surface.width, 3), np.uint8)
+    Compositor(layout, views).compose(images, out)
+    assert layout.surface.height == SURFACE.height + 7
+    assert (out[7:, SURFACE.width :] == images[1]).all()
+    assert (out[:7, SURFACE.width :] == 0).all()
+
+
+def test_a_turned_camera_is_levelled():
+    turn = Turn(pitch_rad=np.radians(2), roll_rad=np.radians(-1.5))
+    attitude = Turn(yaw_rad=YAW / 2, pitch_rad=turn.pitch_rad, roll_rad=turn.roll_rad)
+    images = [
+        Scene().view(LENS, Turn(yaw_rad=-YAW / 2)).frame(STAMP_NS),
+        Scene().view(LENS, attitude).frame(STAMP_NS),
+    ]
+    level = [View(LENS, SURFACE)] * 2
+    turned = [level[0], replace(level[1], turn=turn)]
+    quality = []
+    for views in (level, turned):
+        layout, out = composed(views, images)
+        truth = Scene().view(layout.surface).frame(STAMP_NS)
+        quality.append(psnr(out, truth, np.s_[:]))
+    assert quality[1] > FAITHFUL_DB > quality[0]
+
+
+def test_a_seam_between_views_of_different_brightness_is_a_ramp():
+    views = [View(SURFACE, SURFACE)] * 2
+    shape = SURFACE.height, SURFACE.width
+    images = [np.full(shape, 60, np.uint8), np.full(shape, 160, np.uint8)]
+    layout = lay_out(views, [(OFFSET, 0.0)], fade_px=20.0, crop='none')
+    out = np.empty((layout.surface.height, layout.surface.width), np.uint8)
+    Compositor(layout, views).compose(images, out)
+    begin, end = layout.seams[0]
+    steps = np.diff(out[:, begin - 2 : end + 2].astype(int), axis=1)
+    assert end - begin == 20
+    assert steps.min() >= 0
+    assert steps.max() <= 100 / 20 + 1
+    assert (out[:, :begin] == 60).all()
+    assert (out[:, end:] == 160).all()
+
+
+def test_five_cameras():
+    narrow = surface_for(make_lens('plumb_bob', 100, 80, [80, 0, 49.5, 0, 80, 39.5, 0, 0, 1], []))
+    views = [View(narrow, narrow)] * 5
+    images = [np.full((narrow.height, narrow.width), 40 * (i + 1), np.uint8) for i in range(5)]
+    layout = lay_out(views, [(narrow.width - 20, 0.0)] * 4, fade_px=8.0, crop='none')
+    out = np.empty((layout.surface.height, layout.surface.width), np.uint8)
+    Compositor(layout, views).compose(images, out)
+    assert layout.surface.width == 5 * narrow.width - 4 * 20
+    assert sorted(set(np.unique(out)) & {40, 80, 120, 160, 200}) == [40, 80, 120, 160, 200]
+    assert (np.diff(out.astype(int), axis=1) >= 0).all()
+
+
+@pytest.mark.parametrize('corrected', [False, True])
+def test_a_picture_of_another_size_is_refused(pictures, corrected):
+    views, images = views_of(pictures, corrected)
+    with pytest.raises(ImageFormatError, match=r'has \d+x100 px'):
+        composed(views, [images[0], images[1][:100]])
+
+
+def test_grey_pictures_give_a_grey_panorama(pictures):
+    views, images = views_of(pictures, corrected=False)
+    grey = [cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) for image in images]
+    layout = lay_out(views, [(OFFSET, 0.0)], fade_px=10.0, crop='valid')
+    out = np.empty((layout.surface.height, layout.surface.width), np.uint8)
+    Compositor(layout, views).compose(grey, out)
+    assert out.min() > 0

@@ -1,0 +1,102 @@
+"""The stitcher: from cameras and pictures to the right panorama, without ROS."""
+
+from dataclasses import replace
+from math import nan
+
+import numpy as np
+import pytest
+from fisheye_capture.scene import Scene
+from fisheye_capture.synthetic import synthetic_lens
+from fisheye_geometry.errors import OverlapError
+from fisheye_geometry.image_circle import ImageCircle
+from fisheye_geometry.remap import Turn
+from panorama_stitch.settings import PanoramaSettings
+from panorama_stitch.stitcher import Stitcher
+
+YAW = np.radians(140)
+LENS = synthetic_lens(640, 480, np.radians(170))
+SETTINGS = PanoramaSettings()
+CLOSE_PX = 1.0
+
+
+@pytest.fixture(scope='module')
+def pictures():
+    return [Scene().view(LENS, Turn(yaw_rad=yaw)).frame(0) for yaw in (-YAW / 2, YAW / 2)]
+
+
+def stitcher_of(lenses=(LENS, LENS), names=('left', 'right')):
+    stitcher = Stitcher(names)
+    for name, lens in zip(names, lenses, strict=True):
+        stitcher.place(name, lens, SETTINGS.surface_of(lens))
+    return stitcher
+
+
+def test_it_measures_the_offset_of_the_synthetic_rig(pictures):
+    stitcher = stitcher_of()
+    (overlap,) = stitcher.measure([pictures], SETTINGS, 'particles')
+    assert overlap.found
+    assert overlap.offset_x_px == pytest.approx(YAW * LENS.focal_x_px, abs=CLOSE_PX)
+    assert overlap.offset_y_px == pytest.approx(0, abs=CLOSE_PX)
+
+
+def test_cameras_of_different_focal_length_get_one(pictures):
+    longer = replace(LENS, focal_x_px=LENS.focal_x_px * 1.02, focal_y_px=LENS.focal_y_px * 1.02)
+    right = Scene().view(longer, Turn(yaw_rad=YAW / 2)).frame(0)
+    stitcher = stitcher_of((LENS, longer))
+    left_surface, right_surface = stitcher.surfaces
+    assert left_surface.focal_px == right_surface.focal_px
+    (overlap,) = stitcher.measure([[pictures[0], right]], SETTINGS, 'particles')
+    expected = YAW * LENS.focal_x_px + left_surface.center_x_px - right_surface.center_x_px
+    assert overlap.offset_x_px == pytest.approx(expected, abs=CLOSE_PX)
+
+
+def test_without_a_measurement_the_frames_stand_side_by_side(pictures):
+    stitcher = stitcher_of()
+    layout = stitcher.compositor(SETTINGS, pictures).layout
+    assert layout.surface.width == sum(surface.width for surface in stitcher.surfaces)
+
+
+def test_an_offset_set_by_hand_wins_and_nan_gives_the_measured_one_back(pictures):
+    stitcher = stitcher_of()
+    stitcher.overlaps = stitcher.measure([pictures], SETTINGS, 'particles')
+    by_hand = stitcher.in_use(replace(SETTINGS, offset_x_px=(500.0,), offset_y_px=(nan,)))[0]
+    assert (by_hand.offset_x_px, by_hand.method) == (500.0, 'manual')
+    assert by_hand.offset_y_px == stitcher.overlaps[0].offset_y_px
+    assert stitcher.in_use(SETTINGS) == stitcher.overlaps
+    with pytest.raises(OverlapError, match='offset_x_px has 2 numbers; expected 1'):
+        stitcher.in_use(replace(SETTINGS, offset_x_px=(500.0, 2.0)))
+
+
+def test_another_surface_makes_the_overlap_void(pictures):
+    stitcher = stitcher_of()
+    stitcher.overlaps = stitcher.measure([pictures], SETTINGS, 'particles')
+    assert not stitcher.place('left', LENS, SETTINGS.surface_of(LENS)), 'nothing new'
+    assert stitcher.overlaps
+    assert stitcher.place('left', LENS, replace(SETTINGS, hfov_deg=150.0).surface_of(LENS))
+    assert stitcher.overlaps is None
+
+
+def test_nothing_to_measure_on_is_said(pictures):
+    with pytest.raises(OverlapError, match='no pair of frames has come yet'):
+        stitcher_of().measure([], SETTINGS, 'particles')
+
+
+def test_three_cameras():
+    yaws = np.radians([-120, 0, 120])
+    pictures = [Scene().view(LENS, Turn(yaw_rad=yaw)).frame(0) for yaw in yaws]
+    stitcher = stitcher_of((LENS,) * 3, ('left', 'middle', 'right'))
+    stitcher.overlaps = stitcher.measure([pictures], SETTINGS, 'correlation')
+    expected = pytest.approx(np.radians(120) * LENS.focal_x_px, abs=CLOSE_PX)
+    assert [overlap.offset_x_px for overlap in stitcher.overlaps] == [expected, expected]
+    compositor = stitcher.compositor(SETTINGS, pictures)
+    out = np.empty((compositor.layout.surface.height, compositor.layout.surface.width, 3), np.uint8)
+    compositor.compose(pictures, out)
+    assert out.any(axis=2).all()
+
+
+def test_a_dark_circle_is_no_part_of_the_panorama(pictures):
+    circle = ImageCircle(LENS)
+    lit = Scene().view(LENS.seen_within(np.radians(80)), Turn(yaw_rad=-YAW / 2)).frame(0)
+    assert circle.look(lit)
+    lens = LENS.seen_within(circle.angle_rad)
+    assert SETTINGS.surface_of(lens).width < SETTINGS.surface_of(LENS).width
