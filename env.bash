@@ -1,19 +1,19 @@
 # Source this file in bash: it gives a shell in which the built nodes run.
 
-_fisheye_env() {
-  local root nounset
-  root=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
-  if [ ! -e "$root/install/.built" ]; then
-    echo "Nothing is built here yet: run 'make build' in $root first." >&2
-    return 1
-  fi
-  [[ $- == *u* ]] && nounset=-u || nounset=+u
-  set +u  # the scripts of colcon and ament read variables that may be unset
-  source "$root/.venv/local_setup.bash"
-  source "$root/install/setup.bash"
-  set $nounset
-  export RMW_IMPLEMENTATION=${RMW_IMPLEMENTATION:-rmw_fastrtps_cpp}
-  export ROS_AUTOMATIC_DISCOVERY_RANGE=${ROS_AUTOMATIC_DISCOVERY_RANGE:-LOCALHOST}
-  export ROS_LOG_DIR=${ROS_LOG_DIR:-$root/log/ros}
-}
-_fisheye_env
+_fisheye=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+if [ ! -e "$_fisheye/install/.built" ]; then
+  echo "Nothing is built here yet: run 'make build' in $_fisheye first." >&2
+  unset _fisheye
+  return 1
+fi
+export RMW_IMPLEMENTATION="${RMW_IMPLEMENTATION:-rmw_fastrtps_cpp}"
+export ROS_AUTOMATIC_DISCOVERY_RANGE="${ROS_AUTOMATIC_DISCOVERY_RANGE:-LOCALHOST}"
+export ROS_LOG_DIR="${ROS_LOG_DIR:-$_fisheye/log/ros}"
+
+# colcon's and ament's scripts read variables that may be unset.
+case $- in *u*) _fisheye_unset=-u ;; *) _fisheye_unset=+u ;; esac
+set +u
+source "$_fisheye/.venv/local_setup.bash" &&
+  source "$_fisheye/install/setup.bash"  # also names config/fastdds.xml, unless you named another profile
+set $_fisheye_unset
+unset _fisheye _fisheye_unset

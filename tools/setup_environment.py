@@ -1,8 +1,8 @@
-"""Make `.venv`, the environment that the Makefile builds, tests and runs in.
+"""Make `.venv`, in which the Makefile builds, tests and runs.
 
 Where ROS 2 Jazzy is sourced, `.venv` holds only the Python modules of requirements.txt that are
-missing there; anywhere else it holds ROS 2 Jazzy too, from wheels. A `.venv` that is already what
-it should be is left alone. What is missing on the machine is named in one sentence.
+missing there; anywhere else it holds ROS 2 Jazzy too, from wheels. A `.venv` that is as it should
+be is left alone. What the machine lacks is named in one sentence.
 """
 
 import hashlib
@@ -21,66 +21,69 @@ ROOT = Path(__file__).resolve().parent.parent
 VENV = ROOT / '.venv'
 REQUIREMENTS = ROOT / 'requirements.txt'
 DONE = VENV / '.done'
-OLDEST, NEWEST = (3, 10), (3, 13)
-# Distributions whose module is not called like them.
-MODULES = {'opencv-python-headless': 'cv2', 'pyyaml': 'yaml'}
-# The wheels' CMake files name two directories of the machine that built them.
-FOREIGN_INCLUDE = re.compile(r'/opt/python/cp\d+-cp\d+/include/python3\.\d+')
-FOREIGN_NUMPY = re.compile(r'/opt/python/cp\d+-cp\d+/lib/python3\.\d+/site-packages/numpy/')
+VERSION = '{}.{}'.format(*sys.version_info[:2])
+SUPPORTED = '3.10', '3.11', '3.12', '3.13'
+# Distributions whose module has another name.
+MODULES = {'empy': 'em', 'opencv-python-headless': 'cv2', 'pyyaml': 'yaml'}
 
 
 def main():
-    """Make `.venv` unless it is there, made by this script from these requirements."""
-    ros = os.environ.get('ROS_DISTRO')
+    """Make `.venv`, unless it was made from these requirements for this Python and this ROS."""
+    ros = os.environ.get('ROS_DISTRO', '')
     python = Path(getattr(sys, '_base_executable', sys.executable)).resolve()
-    sources = REQUIREMENTS.read_bytes() + Path(__file__).read_bytes()
-    state = '\n'.join(
-        [f'{python} {platform.python_version()}', str(ROOT), str(ros)]
-        + [hashlib.sha256(sources).hexdigest()]
-    )
+    recipe = hashlib.sha256(REQUIREMENTS.read_bytes() + Path(__file__).read_bytes()).hexdigest()
+    state = '\n'.join([str(python), platform.python_version(), str(ROOT), ros, recipe])
     if DONE.exists() and DONE.read_text() == state:
         return
     check_machine(ros)
-    origin = 'the sourced ROS 2' if ros else 'wheels of ROS 2'
-    say(f'Setting up .venv with Python {platform.python_version()} and {origin} ...')
+    missing = missing_beside_ros() if ros else ['-r', REQUIREMENTS]
+    say(f'Making .venv for Python {VERSION} with ROS 2 {"as sourced" if ros else "from wheels"}')
     shutil.rmtree(VENV, ignore_errors=True)
-    run([python, '-m', 'venv', *(['--system-site-packages'] if ros else []), VENV])
-    if ros:
-        install(missing_beside_ros())
-    else:
-        install(['-r', REQUIREMENTS])
-        correct_cmake_files()
-    write_shell_setup(ros)
+    system = ['--system-site-packages'] if ros else []
+    if subprocess.run([python, '-m', 'venv', *system, VENV]).returncode:
+        stop('Python could not make .venv; its own words are above')
+    install(missing)
+    packages = VENV / 'lib' / f'python{VERSION}' / 'site-packages'
+    correct_cmake_files(VENV / 'share', packages)
+    (VENV / 'local_setup.bash').write_text(shell_setup(ros, packages))
     DONE.write_text(state)
 
 
 def check_machine(ros):
-    """Stop with a sentence where something is missing that only the user can install."""
-    version = '{}.{}'.format(*sys.version_info[:2])
-    if not OLDEST <= sys.version_info[:2] <= NEWEST:
-        stop(f'Python 3.10 to 3.13 is needed, this is {version}: make PYTHON=python3.12 ...')
-    if ros not in (None, 'jazzy'):
-        stop(f'ROS 2 Jazzy is needed, {ros} is sourced: use a shell with Jazzy or with none.')
-    if not ros and (platform.system(), platform.machine()) != ('Linux', 'x86_64'):
-        stop(
-            f'There are no wheels of ROS 2 for {platform.system()} on {platform.machine()}: '
-            'install ROS 2 Jazzy and source it.'
-        )
+    """Stop where something is missing that only the user can install."""
+    if VERSION not in SUPPORTED:
+        stop(f'Python {VERSION} is not supported: name one from 3.10 to 3.13, make PYTHON=python3.12')
+    if ros not in ('', 'jazzy'):
+        stop(f'ROS 2 {ros} is sourced: use a shell with ROS 2 Jazzy, or with none')
+    if ros and not os.environ.get('AMENT_PREFIX_PATH'):
+        stop(f'ROS_DISTRO is set, but ROS 2 is not sourced: source /opt/ros/{ros}/setup.bash')
+    if ros and not serves_this_python(importlib.util.find_spec('rclpy')):
+        stop(f'The sourced ROS 2 is not for Python {VERSION}: make PYTHON=/usr/bin/python3')
+    machine = f'{platform.system()} {platform.machine()}'
+    if not ros and machine != 'Linux x86_64':
+        stop(f'There are no wheels of ROS 2 for {machine}: install ROS 2 Jazzy and source it')
     if not importlib.util.find_spec('ensurepip'):
-        stop(f'The venv module of Python is missing: sudo apt install python{version}-venv')
+        stop(f'Python cannot make virtual environments: sudo apt install python{VERSION}-venv')
     if not Path(sysconfig.get_paths()['include'], 'Python.h').exists():
-        stop(f'The headers of Python are missing: sudo apt install python{version}-dev')
-    if not any(map(shutil.which, ['c++', os.environ.get('CXX', 'g++')])):
+        stop(f'The headers of Python are missing: sudo apt install python{VERSION}-dev')
+    if not any(map(shutil.which, [os.environ.get('CXX', 'c++'), 'g++', 'clang++'])):
         stop('A C++ compiler is missing: sudo apt install g++')
 
 
+def serves_this_python(module):
+    """Whether a module's compiled parts were built for the Python that runs this."""
+    binaries = f'*.{sys.implementation.cache_tag}-*.so'
+    return module is not None and any(Path(module.origin).parent.glob(binaries))
+
+
 def missing_beside_ros():
-    """Return what pip must add to the sourced ROS 2, with limits that leave its NumPy alone."""
-    wanted = []
-    for name, version in re.findall(r'^([\w-]+).*==([\d.]+)', REQUIREMENTS.read_text(), re.M):
+    """Return what pip has to add to the sourced ROS 2."""
+    prefixes = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
+    # What is added may be older than in requirements.txt, so as to go with the NumPy of ROS.
+    missing = [f'numpy=={importlib.metadata.version("numpy")}']
+    for name, version in re.findall(r'^([\w-]+).*?==(\S+)', REQUIREMENTS.read_text(), re.M):
+        package = name.replace('ros-jazzy-', '').replace('-', '_')
         if name.startswith('ros-jazzy-'):
-            package = name.replace('ros-jazzy-', '').replace('-', '_')
-            prefixes = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
             if not any(Path(prefix, 'share', package).exists() for prefix in prefixes):
                 stop(f'The sourced ROS 2 lacks {package}: sudo apt install {name}')
         elif name.startswith('colcon-'):
@@ -90,67 +93,76 @@ def missing_beside_ros():
             if not shutil.which('cmake'):
                 stop('cmake is missing: sudo apt install cmake')
         elif not importlib.util.find_spec(MODULES.get(name, name)):
-            # A newer one may want a newer NumPy than the one that ROS was built with.
-            wanted.append(f'{name}<={version}')
-    if importlib.util.find_spec('numpy'):
-        wanted.append(f'numpy=={importlib.metadata.version("numpy")}')
-    return wanted
+            missing.append(f'{name}<={version}')
+    return missing
 
 
-def install(arguments):
-    """Have pip install wheels into `.venv`, saying how far it is."""
-    say('Installing what requirements.txt names (some minutes the first time) ...')
-    command = [VENV / 'bin' / 'python', '-m', 'pip', 'install', '--prefer-binary']
-    command += ['--no-cache-dir', '--disable-pip-version-check', '--progress-bar=off', *arguments]
-    with subprocess.Popen(list(map(str, command)), stdout=subprocess.PIPE, text=True) as pip:
-        found = 0
+def install(requirements):
+    """Have pip install into `.venv`, and say how far it is."""
+    say('Installing Python packages, which takes a minute or more the first time')
+    command = [VENV / 'bin' / 'python', '-m', 'pip', 'install', '--prefer-binary', *requirements]
+    command += ['--no-cache-dir', '--disable-pip-version-check', '--progress-bar=off']
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as pip:
+        collected = 0
         for line in pip.stdout:
-            found += line.startswith('Collecting')
-            if line.startswith('Collecting') and found % 25 == 0:
-                say(f'  {found} wheels fetched ...')
-            elif line.startswith('Installing'):
-                say(f'  {found} wheels fetched, unpacking ...')
+            collected += line.startswith('Collecting')
+            if line.startswith('Collecting') and collected % 25 == 0:
+                say(f'  {collected} packages fetched')
+            elif line.startswith('Installing collected'):
+                say(f'  {collected} packages fetched, unpacking them')
     if pip.returncode:
-        stop('pip could not install what requirements.txt names; its own words are above.')
+        stop('pip could not install what requirements.txt names; its own words are above')
 
 
-def correct_cmake_files():
-    """Let the wheels' CMake files name this Python's headers and this NumPy's."""
-    include = sysconfig.get_paths()['include']
-    packages = sysconfig.get_paths(vars={'base': str(VENV)})['purelib']
-    for path in VENV.glob('share/*/cmake/*.cmake'):
+def correct_cmake_files(share, packages):
+    """Replace the folders of another machine that the wheels' CMake files name.
+
+    Parameters
+    ----------
+    share : Path
+        The folder with the CMake files.
+    packages : Path
+        The site-packages folder that holds NumPy.
+    """
+    headers = re.compile(r'/opt/python/[\w-]+/include/python[\d.]+')
+    numpy = re.compile(r'/opt/python/[\w-]+/lib/python[\d.]+/site-packages/numpy')
+    for path in share.glob('*/cmake/*.cmake'):
         text = path.read_text()
-        corrected = FOREIGN_NUMPY.sub(f'{packages}/numpy/', FOREIGN_INCLUDE.sub(include, text))
+        corrected = headers.sub(sysconfig.get_paths()['include'], text)
+        corrected = numpy.sub(f'{packages}/numpy', corrected)
         if corrected != text:
             path.write_text(corrected)
 
 
-def write_shell_setup(ros):
-    """Write what a shell needs to find `.venv`, under the name that colcon looks for in a prefix."""
-    packages = sysconfig.get_paths(vars={'base': str(VENV)})['purelib']
-    lines = [f'[[ ":$PATH:" == *":{VENV}/bin:"* ]] || export PATH="{VENV}/bin:$PATH"']
+def shell_setup(ros, packages):
+    """Return what bash needs to find `.venv`: the script that colcon expects in a prefix."""
+    find_programs = f'[[ ":$PATH:" == *":{VENV}/bin:"* ]] || export PATH="{VENV}/bin:$PATH"\n'
     if ros:
-        lines.append(f'export PYTHONPATH="$PYTHONPATH:{packages}"')
-    else:
-        lines.append(f'export AMENT_PREFIX_PATH="{VENV}"')
-    Path(VENV, 'local_setup.bash').write_text('\n'.join(lines) + '\n')
-
-
-def run(command):
-    """Run a command whose failure stops the set-up."""
-    if subprocess.run(list(map(str, command))).returncode:
-        stop(f'This failed: {" ".join(map(str, command))}')
+        return find_programs + f'export PYTHONPATH="$PYTHONPATH:{packages}"\n'
+    return (
+        'if [ -n "$ROS_DISTRO" ]; then\n'
+        f'  echo "{ROOT} was built without the ROS 2 that is sourced: run make build." >&2\n'
+        '  return 1\n'
+        'fi\n'
+        f'{find_programs}'
+        f'export AMENT_PREFIX_PATH="{VENV}"\n'
+    )
 
 
 def say(line):
-    """Print one line of progress."""
+    """Print a line of progress."""
     print(line, flush=True)
 
 
 def stop(sentence):
-    """End with a sentence and a failure."""
-    sys.exit(f'fisheye-panorama: {sentence}')
+    """Exit with a failure and a sentence."""
+    sys.exit(f'fisheye-panorama: {sentence}.')
 
 
 if __name__ == '__main__':
-    main()
+    try:
+        main()
+    except OSError as error:
+        stop(f'.venv could not be made: {error}')
+    except KeyboardInterrupt:
+        stop('.venv is not finished: it was interrupted')
