@@ -1,10 +1,11 @@
 """sensor_msgs/CameraInfo to lens and back."""
 
+from sensor_msgs.msg import CameraInfo
+from std_msgs.msg import Header
+
 from fisheye_geometry.camera_file import Camera
 from fisheye_geometry.errors import CalibrationError
 from fisheye_geometry.lens import Lens, make_lens
-from sensor_msgs.msg import CameraInfo
-from std_msgs.msg import Header
 
 
 def camera_of(message: CameraInfo, name: str = '') -> Camera:
@@ -17,15 +18,18 @@ def camera_of(message: CameraInfo, name: str = '') -> Camera:
     """
     if not any(message.k):
         raise CalibrationError(
-            'the camera is not calibrated (K is zero); make a calibration file with calibrate_lens '
-            'and name it in camera_info_url'
+            'the camera is not calibrated (K is zero); make a calibration file with '
+            'calibrate_lens and name it in camera_info_url'
         )
     if max(message.binning_x, message.binning_y) > 1:
         raise CalibrationError(
             f'binning is {message.binning_x}x{message.binning_y}; expected full pictures'
         )
     roi = message.roi
-    if (roi.width or message.width, roi.height or message.height) != (message.width, message.height):
+    if (roi.width or message.width, roi.height or message.height) != (
+        message.width,
+        message.height,
+    ):
         raise CalibrationError(f'roi is {roi.width}x{roi.height} px; expected full pictures')
     lens = make_lens(message.distortion_model, message.width, message.height, message.k, message.d)
     return Camera(name, lens, tuple(map(float, message.r)), tuple(map(float, message.p)))

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from fisheye_geometry.errors import ImageFormatError
-from fisheye_geometry.lens import MAX_PICTURE_SIDE_PX
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
+
+from fisheye_geometry.errors import ImageFormatError
+from fisheye_geometry.lens import MAX_PICTURE_SIDE_PX
 
 CHANNELS = {'bgr8': 3, 'rgb8': 3, 'mono8': 1}
 """The encodings that the nodes work in and publish."""
@@ -68,7 +69,8 @@ def to_array(message: Image) -> tuple[np.ndarray, str]:
     form = _FORMATS.get(message.encoding)
     if form is None:
         raise ImageFormatError(
-            f"encoding '{message.encoding:.40}' is not taken; expected one of {', '.join(_FORMATS)}"
+            f"encoding '{message.encoding:.40}' is not taken; "
+            f'expected one of {", ".join(_FORMATS)}'
         )
     width, height, step = message.width, message.height, message.step
     size = f'an image of {width}x{height} px in {message.encoding}'
@@ -77,7 +79,9 @@ def to_array(message: Image) -> tuple[np.ndarray, str]:
     if form.block > 1 and (width % 2 or (height % 2 and form.channels == 1)):
         raise ImageFormatError(f'{size}; this encoding shares colour and needs an even size')
     if step < width * form.channels:
-        raise ImageFormatError(f'{size} has rows of {step} bytes; expected {width * form.channels}')
+        raise ImageFormatError(
+            f'{size} has rows of {step} bytes; expected {width * form.channels}'
+        )
     if len(message.data) != step * height:
         raise ImageFormatError(f'{size} has {len(message.data)} bytes; expected {step * height}')
     shape = (height, width) if form.channels == 1 else (height, width, form.channels)
@@ -167,7 +171,8 @@ def from_jpeg(message: CompressedImage) -> tuple[np.ndarray, str]:
         image = None
     if image is None:
         raise ImageFormatError(
-            f"{coded.size} bytes of format '{message.format:.40}' are no picture; expected JPEG or PNG"
+            f"{coded.size} bytes of format '{message.format:.40}' are no picture; "
+            'expected JPEG or PNG'
         )
     return image, 'mono8' if grey else 'bgr8'
 
@@ -183,7 +188,7 @@ _COLOR_CHANGES = {
 
 
 def converted(image: np.ndarray, encoding: str, wanted: str) -> np.ndarray:
-    """Give a picture in another of the encodings in `CHANNELS`, itself if it is in that already."""
+    """Give a picture in another of the encodings in `CHANNELS`, itself if it is in that."""
     if encoding == wanted:
         return image
     return cv2.cvtColor(image, _COLOR_CHANGES[encoding, wanted])

@@ -4,8 +4,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from fisheye_geometry.errors import FisheyeError, SettingError
-from fisheye_geometry.settings import Rule, convert, describe_range, rules
 from rcl_interfaces.msg import (
     FloatingPointRange,
     IntegerRange,
@@ -14,6 +12,9 @@ from rcl_interfaces.msg import (
 )
 from rclpy.exceptions import InvalidParameterValueException
 from rclpy.node import Node
+
+from fisheye_geometry.errors import FisheyeError, SettingError
+from fisheye_geometry.settings import Rule, convert, describe_range, rules
 
 
 class Parameters:

@@ -1,8 +1,9 @@
 """fisheye_msgs/Projection to surface and back."""
 
-from fisheye_geometry.surface import Surface
 from fisheye_msgs.msg import Projection
 from std_msgs.msg import Header
+
+from fisheye_geometry.surface import Surface
 
 
 def surface_of(message: Projection) -> Surface:

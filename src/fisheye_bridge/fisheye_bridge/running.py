@@ -1,7 +1,6 @@
 """Running a node as a process: start, spin, and end without a traceback."""
 
 import rclpy
-from fisheye_geometry.errors import FisheyeError
 from rclpy.exceptions import ParameterException
 from rclpy.executors import (
     ExternalShutdownException,
@@ -10,6 +9,8 @@ from rclpy.executors import (
 )
 from rclpy.logging import get_logger
 from rclpy.node import Node
+
+from fisheye_geometry.errors import FisheyeError
 
 
 def run(node_class: type[Node], *, threads: int = 1) -> int:

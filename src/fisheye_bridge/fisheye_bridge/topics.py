@@ -3,7 +3,6 @@
 from collections.abc import Callable
 
 import numpy as np
-from fisheye_geometry.errors import FisheyeError
 from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
 from sensor_msgs.msg import CompressedImage, Image
@@ -11,6 +10,7 @@ from std_msgs.msg import Header
 
 from fisheye_bridge.images import from_jpeg, to_array, to_jpeg
 from fisheye_bridge.qos import ADJUSTABLE, IMAGE
+from fisheye_geometry.errors import FisheyeError
 
 TRANSPORTS = ('raw', 'compressed')
 _WARNING_PAUSE_S = 5.0

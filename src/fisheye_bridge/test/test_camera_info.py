@@ -1,14 +1,15 @@
 """CameraInfo: there and back, and what is no calibration refused."""
 
 import pytest
+from fisheye_msgs.msg import Projection
+from std_msgs.msg import Header
+
 from fisheye_bridge.camera_info import camera_info_of, camera_of
 from fisheye_bridge.projection import projection_of, surface_of
 from fisheye_geometry.camera_file import Camera
 from fisheye_geometry.errors import CalibrationError, GeometryError
 from fisheye_geometry.lens import make_lens
 from fisheye_geometry.surface import Surface
-from fisheye_msgs.msg import Projection
-from std_msgs.msg import Header
 
 LENS = make_lens('equidistant', 640, 480, [223, 0, 319, 0, 224, 239, 0, 0, 1], [0.1, 0, 0, 0])
 

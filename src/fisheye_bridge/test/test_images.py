@@ -3,6 +3,9 @@
 import cv2
 import numpy as np
 import pytest
+from sensor_msgs.msg import CompressedImage, Image
+from std_msgs.msg import Header
+
 from fisheye_bridge.images import (
     CHANNELS,
     ImageBuffer,
@@ -13,8 +16,6 @@ from fisheye_bridge.images import (
     to_message,
 )
 from fisheye_geometry.errors import ImageFormatError
-from sensor_msgs.msg import CompressedImage, Image
-from std_msgs.msg import Header
 
 COLORS = np.zeros((8, 12, 3), np.uint8)
 COLORS[:, :6] = (200, 90, 40)
@@ -49,7 +50,7 @@ def yuv(order):
     # OpenCV's plain YUV is full range; cameras send luma 16 to 235 and chroma scaled alike.
     y, u, v = 16 + y * (219 / 255), *(128 + (c - 128.0) * s for c, s in ((u, 1.02), (v, 0.81)))
     packed = np.empty((*y.shape, 2), np.uint8)
-    chroma, luma = ((1, 0) if order == 'yuyv' else (0, 1))
+    chroma, luma = (1, 0) if order == 'yuyv' else (0, 1)
     packed[..., luma] = np.rint(y)
     packed[:, 0::2, chroma] = np.rint(u[:, 0::2])
     packed[:, 1::2, chroma] = np.rint(v[:, 0::2])
@@ -158,5 +159,7 @@ def test_jpeg_is_what_image_transport_reads(encoding, form):
 def test_broken_jpeg_is_refused(data):
     message = CompressedImage(format='jpeg')
     message.data.frombytes(data)
-    with pytest.raises(ImageFormatError, match=f"{len(data)} bytes of format 'jpeg' are no picture"):
+    with pytest.raises(
+        ImageFormatError, match=f"{len(data)} bytes of format 'jpeg' are no picture"
+    ):
         from_jpeg(message)

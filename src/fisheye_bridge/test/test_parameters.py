@@ -1,15 +1,16 @@
-"""Parameters: declared with descriptors, forgiving where it is clear, refused by name elsewhere."""
+"""Parameters: declared with descriptors; what is clear is taken, the rest refused by name."""
 
 from dataclasses import dataclass
 from math import isnan, nan
 
 import pytest
 import rclpy
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
 from fisheye_bridge.parameters import Parameters
 from fisheye_geometry.errors import OverlapError, SettingError
 from fisheye_geometry.settings import setting
-from rclpy.node import Node
-from rclpy.parameter import Parameter
 
 
 @dataclass(frozen=True)

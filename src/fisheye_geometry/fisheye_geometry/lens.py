@@ -65,11 +65,13 @@ class Lens(ABC):
     @property
     def matrix(self) -> np.ndarray:
         """Camera matrix K, (3, 3) float64, in px."""
-        return np.array([
-            [self.focal_x_px, self.skew_px, self.center_x_px],
-            [0.0, self.focal_y_px, self.center_y_px],
-            [0.0, 0.0, 1.0],
-        ])
+        return np.array(
+            [
+                [self.focal_x_px, self.skew_px, self.center_x_px],
+                [0.0, self.focal_y_px, self.center_y_px],
+                [0.0, 0.0, 1.0],
+            ]
+        )
 
     @property
     def ros_model(self) -> str:
@@ -254,8 +256,8 @@ class PinholeLens(Lens):
         for _ in range(20):
             value = self._on_plane(plane)
             step = 1e-6
-            dx = (self._on_plane(plane + (step, 0.0)) - value) / step
-            dy = (self._on_plane(plane + (0.0, step)) - value) / step
+            dx = (self._on_plane(plane + np.array([step, 0.0])) - value) / step
+            dy = (self._on_plane(plane + np.array([0.0, step])) - value) / step
             jacobian = np.stack([dx, dy], axis=-1)
             determinant = np.linalg.det(jacobian)
             jacobian[np.abs(determinant) < 1e-9] = np.eye(2)
@@ -274,7 +276,9 @@ class PinholeLens(Lens):
         rays = np.stack([np.sin(angles), np.zeros_like(angles), np.cos(angles)], axis=-1)
         radius = np.hypot(*target.T)
         plain = np.tan(np.interp(radius, self._distort(rays)[:, 0], angles))
-        return target * np.divide(plain, radius, out=np.ones_like(radius), where=radius > 0)[:, None]
+        return (
+            target * np.divide(plain, radius, out=np.ones_like(radius), where=radius > 0)[:, None]
+        )
 
     def _on_plane(self, plane):
         return self._distort(np.concatenate([plane, np.ones((len(plane), 1))], axis=-1))

@@ -87,9 +87,7 @@ class RemapTable:
         for top in range(0, surface.height, _BAND_ROWS):
             rows = slice(top, min(top + _BAND_ROWS, surface.height))
             where, self.valid[rows] = _source_pixels(source, surface, turn, rows)
-            pixels, fractions = cv2.convertMaps(
-                where, None, cv2.CV_16SC2, nninterpolation=nearest
-            )
+            pixels, fractions = cv2.convertMaps(where, None, cv2.CV_16SC2, nninterpolation=nearest)
             self._pixels[rows] = pixels
             if not nearest:
                 self._fractions[rows] = fractions
@@ -127,7 +125,11 @@ class RemapTable:
         if out is not None and (out.shape != expected or out.dtype != image.dtype):
             raise ImageFormatError(f'out is {out.dtype}{out.shape}; expected {expected}')
         return cv2.remap(
-            image, self._pixels, self._fractions, self._flag, dst=out,
+            image,
+            self._pixels,
+            self._fractions,
+            self._flag,
+            dst=out,
             borderMode=cv2.BORDER_CONSTANT,
         )
 

@@ -179,7 +179,9 @@ def surface_for(
         Where the surface cannot hold what was asked.
     """
     if kind not in _KINDS:
-        raise GeometryError(f"surface '{kind}' is not known; expected one of {', '.join(SURFACES)}")
+        raise GeometryError(
+            f"surface '{kind}' is not known; expected one of {', '.join(SURFACES)}"
+        )
     if scale not in SCALES:
         raise GeometryError(f"scale '{scale}' is not known; expected one of {', '.join(SCALES)}")
     how = _KINDS[kind]

@@ -1,4 +1,4 @@
-"""YAML files that people edit: read with precise errors, written so that none is ever half there."""
+"""YAML files that people edit: read with precise errors, never written by halves."""
 
 import os
 import tempfile
@@ -27,7 +27,9 @@ def read_mapping(path: str | Path) -> dict:
     except OSError as error:
         raise CameraFileError(f'{path} cannot be read: {error.strerror}') from error
     if len(content) > _MAX_BYTES:
-        raise CameraFileError(f'{path} is larger than {_MAX_BYTES} bytes; expected a short YAML file')
+        raise CameraFileError(
+            f'{path} is larger than {_MAX_BYTES} bytes; expected a short YAML file'
+        )
     try:
         mapping = yaml.safe_load(content.decode())
     except UnicodeDecodeError as error:
@@ -40,7 +42,9 @@ def read_mapping(path: str | Path) -> dict:
         reason = str(error).splitlines()[0]
         raise CameraFileError(f'{path} is not valid YAML: {reason}') from error
     if not isinstance(mapping, dict):
-        raise CameraFileError(f'{path} holds {type(mapping).__name__}; expected `key: value` lines')
+        raise CameraFileError(
+            f'{path} holds {type(mapping).__name__}; expected `key: value` lines'
+        )
     return mapping
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from fisheye_geometry.image_circle import ImageCircle
 from fisheye_geometry.lens import make_lens
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from fisheye_geometry.errors import CalibrationError
 from fisheye_geometry.lens import make_lens
 
@@ -9,18 +10,27 @@ EXACT_PX = 1e-6
 """Rounding of float64 through a polynomial and its inverse stays far below it."""
 
 FISHEYE = make_lens(
-    'equidistant', 640, 480, [223.05, 0, 319.5, 0, 223.05, 239.5, 0, 0, 1],
+    'equidistant',
+    640,
+    480,
+    [223.05, 0, 319.5, 0, 223.05, 239.5, 0, 0, 1],
     [-0.02, 0.004, -0.001, 0.0001],
 )
 FOLDING = make_lens(
-    'fisheye', 1280, 960, [392.1, 0.4, 631.8, 0, 393.1, 493.2, 0, 0, 1],
+    'fisheye',
+    1280,
+    960,
+    [392.1, 0.4, 631.8, 0, 393.1, 493.2, 0, 0, 1],
     [-0.1, 0.0, 0.0, 0.0],
 )
 PINHOLE = make_lens(
     'plumb_bob', 640, 480, [400, 0, 310, 0, 405, 250, 0, 0, 1], [-0.3, 0.1, 0.001, -0.002, -0.01]
 )
 RATIONAL = make_lens(
-    'rational_polynomial', 640, 480, [400, 0, 320, 0, 400, 240, 0, 0, 1],
+    'rational_polynomial',
+    640,
+    480,
+    [400, 0, 320, 0, 400, 240, 0, 0, 1],
     [0.5, 0.1, 0.001, 0, 0.01, 0.8, 0.2, 0.02],
 )
 PLAIN = make_lens('plumb_bob', 640, 480, [400, 0, 320, 0, 400, 240, 0, 0, 1], [])
@@ -77,7 +87,9 @@ def test_a_ray_behind_the_camera_is_not_mirrored_into_the_picture():
 
 def test_the_image_circle_limits_what_is_seen():
     lens = FISHEYE.seen_within(np.radians(60))
-    _, seen = lens.project(np.array([[np.sin(1.0), 0, np.cos(1.0)], [np.sin(1.1), 0, np.cos(1.1)]]))
+    _, seen = lens.project(
+        np.array([[np.sin(1.0), 0, np.cos(1.0)], [np.sin(1.1), 0, np.cos(1.1)]])
+    )
     assert seen.tolist() == [True, False]
     assert lens.angle_at(-0.5, 239.5) == pytest.approx(np.radians(60))
 
@@ -101,8 +113,11 @@ def test_the_field_of_view_across_the_picture():
 )
 def test_numbers_that_describe_no_lens_are_refused(change, words):
     good = {
-        'model': 'equidistant', 'width': 640, 'height': 480,
-        'matrix': [200, 0, 320, 0, 200, 240, 0, 0, 1], 'distortion': [0, 0, 0, 0],
+        'model': 'equidistant',
+        'width': 640,
+        'height': 480,
+        'matrix': [200, 0, 320, 0, 200, 240, 0, 0, 1],
+        'distortion': [0, 0, 0, 0],
     }
     with pytest.raises(CalibrationError, match=words):
         make_lens(**{**good, **change})

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from fisheye_geometry.errors import GeometryError, ImageFormatError
 from fisheye_geometry.lens import make_lens
 from fisheye_geometry.remap import INTERPOLATIONS, RemapTable, Turn, remap_table

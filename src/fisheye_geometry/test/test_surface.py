@@ -2,12 +2,16 @@
 
 import numpy as np
 import pytest
+
 from fisheye_geometry.errors import GeometryError
 from fisheye_geometry.lens import make_lens
 from fisheye_geometry.surface import SURFACES, Surface, surface_for
 
 LENS = make_lens(
-    'equidistant', 640, 480, [223.052760542, 0, 319.5, 0, 223.052760542, 239.5, 0, 0, 1],
+    'equidistant',
+    640,
+    480,
+    [223.052760542, 0, 319.5, 0, 223.052760542, 239.5, 0, 0, 1],
     [-0.02, 0.004, -0.001, 0.0001],
 )
 

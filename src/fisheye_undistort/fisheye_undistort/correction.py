@@ -2,9 +2,9 @@
 
 import cv2
 import numpy as np
+
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.remap import RemapTable
-
 from fisheye_undistort.settings import UndistortSettings
 
 

@@ -58,13 +58,21 @@ class UndistortSettings(SurfaceSettings):
     """Settings of the undistort node."""
 
     width: int = setting(
-        0, 'Width of the corrected picture, px; 0: from the scale.', minimum=0, maximum=8192, live=True
+        0,
+        'Width of the corrected picture, px; 0: from the scale.',
+        minimum=0,
+        maximum=8192,
+        live=True,
     )
     transport: str = setting(
         'raw', 'Subscribe to the raw pictures or to their JPEG.', choices=('raw', 'compressed')
     )
     height: int = setting(
-        0, 'Height of the corrected picture, px; 0: from the scale.', minimum=0, maximum=8192, live=True
+        0,
+        'Height of the corrected picture, px; 0: from the scale.',
+        minimum=0,
+        maximum=8192,
+        live=True,
     )
 
     def surface_of(self, lens: Lens) -> Surface:

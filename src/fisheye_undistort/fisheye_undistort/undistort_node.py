@@ -1,6 +1,9 @@
 """Corrects the pictures of one camera with cached maps."""
 
-from fisheye_geometry.background import Background
+from fisheye_msgs.msg import Projection
+from rclpy.node import Node
+from sensor_msgs.msg import CameraInfo, Image
+
 from fisheye_bridge.camera_info import camera_of
 from fisheye_bridge.diagnostics import ERROR, WARN, Diagnostics
 from fisheye_bridge.images import ImageBuffer
@@ -9,12 +12,9 @@ from fisheye_bridge.projection import projection_of
 from fisheye_bridge.qos import IMAGE, LATCHED
 from fisheye_bridge.running import run
 from fisheye_bridge.topics import ImageSubscription
+from fisheye_geometry.background import Background
 from fisheye_geometry.errors import FisheyeError
 from fisheye_geometry.image_circle import ImageCircle
-from fisheye_msgs.msg import Projection
-from rclpy.node import Node
-from sensor_msgs.msg import CameraInfo, Image
-
 from fisheye_undistort.correction import Correction
 from fisheye_undistort.settings import UndistortSettings
 

@@ -6,9 +6,10 @@ Across a link the same file starts both halves: `robot:=true` the captures, `bas
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
-from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironmentVariable
 from launch_ros.actions import Node
+
+from launch import LaunchDescription
 
 CONFIG = Path(get_package_share_directory('panorama_stitch')) / 'config'
 CAMERAS = ('left', 'right')
@@ -76,11 +77,13 @@ def nodes(context):
 
 def generate_launch_description():
     """Start what the arguments say, with the profile without which large images get lost."""
-    return LaunchDescription([
-        *(
-            DeclareLaunchArgument(name, default_value=value, description=text)
-            for name, (value, text) in ARGUMENTS.items()
-        ),
-        SetEnvironmentVariable('FASTRTPS_DEFAULT_PROFILES_FILE', str(CONFIG / 'fastdds.xml')),
-        OpaqueFunction(function=nodes),
-    ])
+    return LaunchDescription(
+        [
+            *(
+                DeclareLaunchArgument(name, default_value=value, description=text)
+                for name, (value, text) in ARGUMENTS.items()
+            ),
+            SetEnvironmentVariable('FASTRTPS_DEFAULT_PROFILES_FILE', str(CONFIG / 'fastdds.xml')),
+            OpaqueFunction(function=nodes),
+        ]
+    )

@@ -3,16 +3,10 @@
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import asdict
+from itertools import pairwise
 from math import degrees, nan
 
 import numpy as np
-from fisheye_bridge.diagnostics import ERROR, WARN, Diagnostics, Report
-from fisheye_bridge.images import ImageBuffer, converted
-from fisheye_bridge.parameters import Parameters
-from fisheye_bridge.projection import projection_of
-from fisheye_bridge.qos import LATCHED
-from fisheye_bridge.topics import ImagePublisher
-from fisheye_geometry.errors import FisheyeError, SettingError
 from fisheye_msgs.msg import Overlap, Overlaps, Particle, Projection
 from fisheye_msgs.srv import CalibrateOverlap
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
@@ -20,6 +14,13 @@ from rclpy.node import Node
 from rclpy.time import Time
 from std_msgs.msg import Header
 
+from fisheye_bridge.diagnostics import ERROR, WARN, Diagnostics, Report
+from fisheye_bridge.images import ImageBuffer, converted
+from fisheye_bridge.parameters import Parameters
+from fisheye_bridge.projection import projection_of
+from fisheye_bridge.qos import LATCHED
+from fisheye_bridge.topics import ImagePublisher
+from fisheye_geometry.errors import FisheyeError, SettingError
 from panorama_stitch import overlap
 from panorama_stitch.compositor import Compositor
 from panorama_stitch.live import LiveStitcher
@@ -38,7 +39,9 @@ class PanoramaBase(Node):
         self._parameters = Parameters(self, settings, on_change=self._apply)
         cameras = self.settings.cameras
         if len(set(cameras)) != len(cameras) or len(cameras) < 2:
-            raise SettingError(f'cameras is {list(cameras)}; expected at least two different names')
+            raise SettingError(
+                f'cameras is {list(cameras)}; expected at least two different names'
+            )
         self._buffer: ImageBuffer | None = None
         self._encoding = ''
         self._published = 0
@@ -115,9 +118,7 @@ class PanoramaBase(Node):
         cameras, surfaces = self.settings.cameras, self.live.stitcher.surfaces
         return [
             _overlap_message(result, names, surface)
-            for result, names, surface in zip(
-                results, zip(cameras, cameras[1:], strict=False), surfaces, strict=False
-            )
+            for result, names, surface in zip(results, pairwise(cameras), surfaces, strict=False)
         ]
 
     def _warn(self, sentence: str) -> None:

@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import cv2
 import numpy as np
-from fisheye_geometry.surface import Surface
 
+from fisheye_geometry.surface import Surface
 from panorama_stitch.view import View
 
 CROPS = ('valid', 'none')
@@ -87,9 +88,7 @@ def lay_out(
         round(pick(values))
         for pick, values in zip((min, min, max, max), zip(*spans, strict=True), strict=True)
     )
-    first, last = (
-        origins[i].x_px + views[i].surface.center_x_px for i in (0, len(views) - 1)
-    )
+    first, last = (origins[i].x_px + views[i].surface.center_x_px for i in (0, len(views) - 1))
     surface = replace(
         views[0].surface,
         width=right - left,
@@ -100,10 +99,7 @@ def lay_out(
     layout = Layout(
         surface,
         tuple(Origin(o.x_px - left, o.y_px - top) for o in origins),
-        tuple(
-            _seam(a[2] - left, b[0] - left, fade_px, right - left)
-            for a, b in zip(spans, spans[1:], strict=False)
-        ),
+        tuple(_seam(a[2] - left, b[0] - left, fade_px, right - left) for a, b in pairwise(spans)),
     )
     return layout if crop == 'none' else _cropped(layout, views)
 
@@ -161,7 +157,9 @@ def _valid_rectangle(shown: np.ndarray, surface: Surface) -> tuple[int, int, int
     inner = slice(trim, width - trim)
     best, rectangle = 0, (0, 0, width, height)
     # Running limits of what each trimmed column, from the inside out, would cost.
-    left_top, left_bottom = _outward(top, bottom, inner, slice(trim - 1, None, -1) if trim else slice(0))
+    left_top, left_bottom = _outward(
+        top, bottom, inner, slice(trim - 1, None, -1) if trim else slice(0)
+    )
     right_top, right_bottom = _outward(top, bottom, inner, slice(width - trim, None))
     for i in range(trim + 1):
         for j in range(trim + 1):

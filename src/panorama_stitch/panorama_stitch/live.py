@@ -1,18 +1,19 @@
 """The live line: frames -> pair -> compose -> publish, with measuring and preparing beside it."""
 
-import threading
 from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from pathlib import Path
+from threading import Lock
 from time import monotonic
 
 import numpy as np
+
+from fisheye_capture.newest import Newest
 from fisheye_geometry.background import Background
 from fisheye_geometry.errors import FisheyeError, OverlapError
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.surface import Surface
-
 from panorama_stitch.compositor import Compositor
 from panorama_stitch.overlap import Overlap
 from panorama_stitch.overlap_file import read_overlaps, write_overlaps
@@ -42,8 +43,6 @@ class LiveStitcher:
         What waits for its partner.
     compositor : Compositor or None
         In use now.
-    dropped : int
-        Groups that were overtaken by a newer one.
     """
 
     def __init__(
@@ -70,35 +69,34 @@ class LiveStitcher:
         self.stitcher = Stitcher(settings.cameras)
         self.pairing = FramePairing(settings.cameras, round(settings.max_pair_skew_s * 1e9))
         self.compositor: Compositor | None = None
-        self.dropped = 0
         self._settings = settings
         self._publish, self._changed, self._warn = publish, changed, warn
         self._background = Background(self._failed)
-        self._arrived = threading.Condition()
-        self._newest: list[Stamped] | None = None
-        self._recent: deque[list[Stamped]] = deque(maxlen=_REMEMBERED)
+        self._lock = Lock()
+        self._recent: deque[list[np.ndarray]] = deque(maxlen=_REMEMBERED)
         self._remembered_at = 0.0
         self._prepare_at = 0.0
         self._pause_s = _FIRST_PAUSE_S
         self._preparing: Future | None = None
-        self._stopping = False
-        self._thread = threading.Thread(target=self._run, name='compose', daemon=True)
-        self._thread.start()
+        self._composing = Newest(self._compose, 'compose')
+
+    @property
+    def dropped(self) -> int:
+        """Groups that were overtaken by a newer one."""
+        return self._composing.dropped
 
     def take(self, camera: str, stamp_ns: int, image: np.ndarray) -> None:
         """Take a frame of a camera; nobody may write to it afterwards."""
-        with self._arrived:
+        with self._lock:
             group = self.pairing.add(camera, stamp_ns, image)
             if group is not None:
-                self.dropped += self._newest is not None
-                self._newest = group
-                self._arrived.notify()
+                self._composing.put(group)
 
     def place(
         self, camera: str, source: Lens | Surface, surface: Surface, interpolation: str = 'linear'
     ) -> None:
         """Say what a camera's pictures show."""
-        with self._arrived:
+        with self._lock:
             if self.stitcher.place(camera, source, surface, interpolation):
                 self._recent.clear()
                 self._prepare_at = 0.0
@@ -130,34 +128,26 @@ class LiveStitcher:
 
     def stop(self) -> None:
         """End the threads."""
-        with self._arrived:
-            self._stopping = True
-            self._arrived.notify()
-        self._thread.join()
+        self._composing.stop()
         self._background.stop()
 
-    def _run(self) -> None:
-        while True:
-            with self._arrived:
-                self._arrived.wait_for(lambda: self._newest or self._stopping)
-                if self._stopping:
-                    return
-                group, self._newest = self._newest, None
-                self._remember(group)
-            images = [member.frame for member in group]
-            self._prepare_if_due(images)
-            if self.compositor is None:
-                continue
-            try:
-                self._publish(self.compositor, images, min(member.stamp_ns for member in group))
-            except FisheyeError as error:
-                self._warn(f'a pair of frames was dropped: {error}')
+    def _compose(self, group: list[Stamped]) -> None:
+        images = [member.frame for member in group]
+        self._remember(images)
+        self._prepare_if_due(images)
+        if self.compositor is None:
+            return
+        try:
+            self._publish(self.compositor, images, min(member.stamp_ns for member in group))
+        except FisheyeError as error:
+            self._warn(f'a pair of frames was dropped: {error}')
 
-    def _remember(self, group: list[Stamped]) -> None:
+    def _remember(self, images: list[np.ndarray]) -> None:
         now = monotonic()
-        if now - self._remembered_at >= _BETWEEN_REMEMBERED_S or not self._recent:
-            self._remembered_at = now
-            self._recent.append(group)
+        with self._lock:
+            if now - self._remembered_at >= _BETWEEN_REMEMBERED_S or not self._recent:
+                self._remembered_at = now
+                self._recent.append(images)
 
     def _prepare_if_due(self, images: Sequence[np.ndarray]) -> None:
         busy = self._preparing is not None and not self._preparing.done()
@@ -209,8 +199,8 @@ class LiveStitcher:
         )
 
     def _measure(self, method: str) -> list[Overlap]:
-        with self._arrived:
-            groups = [[member.frame for member in group] for group in self._recent]
+        with self._lock:
+            groups = list(self._recent)
         return self.stitcher.measure(groups, self._settings, method)
 
     def _calibrate(self, method: str, save: bool) -> list[Overlap]:
@@ -222,7 +212,7 @@ class LiveStitcher:
             new if new.found or not old.found else old
             for new, old in zip(measured, former, strict=True)
         ]
-        self._use([member.frame for member in self._recent[-1]])
+        self._use(self._recent[-1])
         if save:
             self._write(measured)
         return measured

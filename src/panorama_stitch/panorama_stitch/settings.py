@@ -6,7 +6,6 @@ from math import nan
 from fisheye_capture.settings import FrameSettings
 from fisheye_geometry.settings import setting
 from fisheye_undistort.settings import SurfaceSettings
-
 from panorama_stitch.compositor import BLENDS
 from panorama_stitch.layout import CROPS
 from panorama_stitch.overlap import OverlapSettings
@@ -17,7 +16,8 @@ class PanoramaOutputSettings(OverlapSettings):
     """What both nodes that make panoramas can be told."""
 
     cameras: tuple[str, ...] = setting(
-        ('left', 'right'), 'Names of the cameras, from left to right: the namespaces of their topics.'
+        ('left', 'right'),
+        'Names of the cameras, from left to right: the namespaces of their topics.',
     )
     auto_calibrate: bool = setting(
         True, 'Measure the overlap on the first good pair of frames.', live=True
@@ -34,10 +34,12 @@ class PanoramaOutputSettings(OverlapSettings):
         nan=True,
         live=True,
     )
-    overlap_file: str = setting('', 'YAML file with the overlap: read at start, written on request.')
+    overlap_file: str = setting(
+        '', 'YAML file with the overlap: read at start, written on request.'
+    )
     blend: str = setting(
         'feather',
-        'How neighbouring views meet: none lays the right over the left as published, feather fades.',
+        'How neighbours meet: none lays the right over the left as published, feather fades.',
         choices=BLENDS,
         live=True,
     )

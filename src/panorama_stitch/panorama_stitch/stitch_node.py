@@ -1,13 +1,13 @@
 """Stitches corrected pictures of several cameras into one panorama."""
 
+from fisheye_msgs.msg import Projection
+from rclpy.time import Time
+
 from fisheye_bridge.projection import surface_of
 from fisheye_bridge.qos import LATCHED
 from fisheye_bridge.running import run
 from fisheye_bridge.topics import ImageSubscription
 from fisheye_geometry.errors import FisheyeError
-from fisheye_msgs.msg import Projection
-from rclpy.time import Time
-
 from panorama_stitch.base_node import PanoramaBase
 from panorama_stitch.settings import StitchSettings
 

@@ -5,11 +5,11 @@ from dataclasses import replace
 from math import isnan
 
 import numpy as np
+
 from fisheye_geometry.errors import OverlapError
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.remap import LEVEL
 from fisheye_geometry.surface import Surface
-
 from panorama_stitch.compositor import Compositor
 from panorama_stitch.layout import lay_out
 from panorama_stitch.overlap import Overlap, measure_overlap
@@ -110,8 +110,7 @@ class Stitcher:
         overlaps = self.in_use(settings)
         turns = [LEVEL, *(overlap.turn for overlap in overlaps)]
         views = [
-            replace(view, turn=turn)
-            for view, turn in zip(self._views(group), turns, strict=True)
+            replace(view, turn=turn) for view, turn in zip(self._views(group), turns, strict=True)
         ]
         fade_px = np.radians(settings.feather_deg) * views[0].surface.focal_px
         layout = lay_out(

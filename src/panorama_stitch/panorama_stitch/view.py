@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+
 from fisheye_geometry.errors import ImageFormatError
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.remap import LEVEL, RemapTable, Turn, remap_table

@@ -5,6 +5,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+
 from fisheye_capture.scene import Scene
 from fisheye_geometry.errors import ImageFormatError
 from fisheye_geometry.lens import make_lens
@@ -19,7 +20,10 @@ STAMP_NS = 700_000_000
 FAITHFUL_DB = 30.0
 """Two bilinear resamplings of an antialiased scene stay well above it."""
 LENS = make_lens(
-    'equidistant', 320, 240, [111.526, 0, 159.5, 0, 111.526, 119.5, 0, 0, 1],
+    'equidistant',
+    320,
+    240,
+    [111.526, 0, 159.5, 0, 111.526, 119.5, 0, 0, 1],
     [-0.02, 0.004, -0.001, 0.0001],
 ).seen_within(np.radians(92))
 SURFACE = surface_for(LENS)
@@ -28,9 +32,7 @@ OFFSET = YAW * SURFACE.focal_px
 
 @pytest.fixture(scope='module')
 def pictures():
-    return [
-        Scene().view(LENS, Turn(yaw_rad=yaw)).frame(STAMP_NS) for yaw in (-YAW / 2, YAW / 2)
-    ]
+    return [Scene().view(LENS, Turn(yaw_rad=yaw)).frame(STAMP_NS) for yaw in (-YAW / 2, YAW / 2)]
 
 
 def views_of(pictures, corrected):

@@ -1,6 +1,7 @@
 """Pairing: right partners, whatever the order, and never more memory than agreed."""
 
 import pytest
+
 from panorama_stitch.pairing import FramePairing
 
 MS = 1_000_000
@@ -18,10 +19,18 @@ def pair_all(arrivals, max_skew_ms=50, cameras=('left', 'right')):
 
 
 def test_equal_stamps_pair_in_any_order():
-    _, groups = pair_all([
-        ('left', 0), ('right', 0), ('right', PERIOD), ('left', PERIOD),
-        ('left', 2 * PERIOD), ('left', 3 * PERIOD), ('right', 2 * PERIOD), ('right', 3 * PERIOD),
-    ])
+    _, groups = pair_all(
+        [
+            ('left', 0),
+            ('right', 0),
+            ('right', PERIOD),
+            ('left', PERIOD),
+            ('left', 2 * PERIOD),
+            ('left', 3 * PERIOD),
+            ('right', 2 * PERIOD),
+            ('right', 3 * PERIOD),
+        ]
+    )
     assert groups == [[0, 0], [33, 33], [66, 66], [99, 99]]
 
 

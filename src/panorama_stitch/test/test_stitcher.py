@@ -5,6 +5,7 @@ from math import nan
 
 import numpy as np
 import pytest
+
 from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.errors import OverlapError
@@ -89,7 +90,9 @@ def test_three_cameras():
     expected = pytest.approx(np.radians(120) * LENS.focal_x_px, abs=CLOSE_PX)
     assert [overlap.offset_x_px for overlap in stitcher.overlaps] == [expected, expected]
     compositor = stitcher.compositor(SETTINGS, pictures)
-    out = np.empty((compositor.layout.surface.height, compositor.layout.surface.width, 3), np.uint8)
+    out = np.empty(
+        (compositor.layout.surface.height, compositor.layout.surface.width, 3), np.uint8
+    )
     compositor.compose(pictures, out)
     assert out.any(axis=2).all()
 

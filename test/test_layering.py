@@ -1,0 +1,119 @@
+"""The house rules, read from the syntax tree: who may import whom, and that it is declared."""
+
+import ast
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import pytest
+
+SOURCE = Path(__file__).parents[1] / 'src'
+OURS = (
+    'fisheye_geometry',
+    'fisheye_bridge',
+    'fisheye_capture',
+    'fisheye_undistort',
+    'panorama_stitch',
+)
+BELOW = {
+    'fisheye_geometry': set(),
+    'fisheye_bridge': {'fisheye_geometry'},
+    'fisheye_capture': {'fisheye_geometry', 'fisheye_bridge'},
+    'fisheye_undistort': {'fisheye_geometry', 'fisheye_bridge'},
+    'panorama_stitch': {
+        'fisheye_geometry',
+        'fisheye_bridge',
+        'fisheye_capture',
+        'fisheye_undistort',
+    },
+}
+ROS = {
+    'rclpy',
+    'rcl_interfaces',
+    'sensor_msgs',
+    'std_msgs',
+    'diagnostic_msgs',
+    'builtin_interfaces',
+    'fisheye_msgs',
+    'geometry_msgs',
+    'std_srvs',
+    'fisheye_bridge',
+}
+KEYS = {
+    'numpy': 'python3-numpy',
+    'cv2': 'python3-opencv',
+    'yaml': 'python3-yaml',
+    'scipy': 'python3-scipy',
+    'aiohttp': 'python3-aiohttp',
+    'matplotlib': 'python3-matplotlib',
+    'ament_index_python': 'ament_index_python',
+}
+SHARED_SHELL = 'panorama_stitch.base_node'
+"""The one node module that others build on: what stitch_node and panorama_node share."""
+
+MODULES = [
+    pytest.param(package, path, id=f'{package}.{path.stem}')
+    for package in OURS
+    for path in sorted((SOURCE / package / package).rglob('*.py'))
+]
+
+
+def imports(path):
+    """Dotted names that a module imports, anywhere in it."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f'{path}: imports are absolute'
+            yield node.module
+            # `from package import module` names a module too.
+            yield from (f'{node.module}.{a.name}' for a in node.names if node.module in OURS)
+
+
+def is_shell(package, path):
+    return package == 'fisheye_bridge' or path.stem.endswith('_node')
+
+
+@pytest.mark.parametrize(('package', 'path'), MODULES)
+def test_a_package_imports_only_what_lies_below(package, path):
+    used = {name.split('.')[0] for name in imports(path)} & set(OURS) - {package}
+    assert used <= BELOW[package]
+
+
+@pytest.mark.parametrize(('package', 'path'), MODULES)
+def test_only_shells_know_ros(package, path):
+    if not is_shell(package, path):
+        assert {name.split('.')[0] for name in imports(path)} & ROS == set()
+
+
+@pytest.mark.parametrize(('package', 'path'), MODULES)
+def test_node_files_do_not_import_each_other(package, path):
+    nodes = {name for name in imports(path) if name.split('.')[0] in OURS and '_node' in name}
+    allowed = {SHARED_SHELL, f'{SHARED_SHELL}.PanoramaBase'} if is_shell(package, path) else set()
+    if path.stem == 'calibrate_lens':
+        # The command line starts the live collection, and only that needs ROS.
+        allowed.add('fisheye_undistort.collect_node')
+    assert {name for name in nodes if name.count('.') == 1} <= allowed
+
+
+@pytest.mark.parametrize('package', OURS)
+def test_every_import_is_declared_in_package_xml(package):
+    declared = {
+        entry.text
+        for entry in ElementTree.parse(SOURCE / package / 'package.xml').getroot()
+        if entry.tag in ('depend', 'exec_depend')
+    }
+    tops = {
+        name.split('.')[0]
+        for path in (SOURCE / package / package).rglob('*.py')
+        for name in imports(path)
+    }
+    known = ROS | set(OURS) | set(KEYS)
+    needed = {KEYS.get(name, name) for name in tops & known} - {package}
+    assert needed <= declared
+
+
+def test_no_other_library_is_imported():
+    import sys
+
+    tops = {name.split('.')[0] for p in MODULES for name in imports(p.values[1])}
+    assert tops - set(sys.stdlib_module_names) - ROS - set(OURS) - set(KEYS) == set()

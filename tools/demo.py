@@ -1,0 +1,112 @@
+"""The main job, shown: five real nodes make a panorama; it is measured and saved."""
+
+import argparse
+import json
+import math
+import sys
+import time
+from pathlib import Path
+
+import cv2
+import numpy as np
+from rig import Rig, camera_parameters, unused_domain, wait_for
+from watcher import Watcher
+
+from fisheye_geometry.errors import FisheyeError
+
+SYNTHETIC_OFFSET_DEG = 140.0
+START_TIMEOUT_S = 60.0
+
+
+def main() -> int:
+    """Run the demonstration; the exit code says whether a panorama came."""
+    arguments = parse()
+    domain = unused_domain()
+    out = arguments.out
+    out.mkdir(parents=True, exist_ok=True)
+    with Rig(domain, out / 'log') as rig, Watcher(domain) as watcher:
+        what = arguments.rig or 'the synthetic rig'
+        nodes = 'one node' if arguments.composed else 'five nodes'
+        print(f'Starting {nodes} on {what} ...', flush=True)
+        begin = time.monotonic()
+        cameras = camera_parameters(arguments.rig)
+        rig.start_all(arguments.composed, cameras, frame_rate_hz=arguments.rate)
+        wait_for(lambda: rig.check_alive() or watcher.newest, START_TIMEOUT_S, 'a first panorama')
+        print(f'First panorama after {time.monotonic() - begin:.1f} s.', flush=True)
+        answer = watcher.calibrate()
+        print(f'/calibrate_overlap: {answer.message}')
+        watch(watcher, rig, arguments.seconds)
+        report(watcher, answer, arguments)
+        cv2.imwrite(str(out / 'panorama.png'), watcher.picture())
+        print(f'Saved {out / "panorama.png"}')
+    return 0
+
+
+def parse() -> argparse.Namespace:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--rig', type=Path, help='folder with left/right .png and .yaml')
+    parser.add_argument('--out', type=Path, default=Path('out'), help='where results go')
+    parser.add_argument('--seconds', type=float, default=5.0, help='how long to watch')
+    parser.add_argument('--rate', type=float, default=30.0, help='frames a second')
+    parser.add_argument('--composed', action='store_true', help='one process instead of five')
+    arguments = parser.parse_args()
+    for side in ('left', 'right') if arguments.rig else ():
+        for suffix in ('png', 'yaml'):
+            if not (path := arguments.rig / f'{side}.{suffix}').is_file():
+                parser.error(f'{path} is not there; expected left and right .png and .yaml')
+    return arguments
+
+
+def watch(watcher: Watcher, rig: Rig, seconds: float) -> None:
+    """Count panoramas for a while, with a line that shows that they come."""
+    watcher.restart()
+    end = time.monotonic() + seconds
+    while (left := end - time.monotonic()) > 0:
+        rig.check_alive()
+        time.sleep(min(0.25, left))
+        if sys.stdout.isatty():
+            print(f'\r{len(watcher.stamps_ns)} panoramas ...', end='', flush=True)
+    if sys.stdout.isatty():
+        print('\r', end='')
+
+
+def report(watcher: Watcher, answer, arguments: argparse.Namespace) -> None:
+    """Print the offset against the truth, and what came at which rate and age."""
+    overlap = answer.overlaps[0]
+    true_deg = true_offset_deg(arguments.rig)
+    true = 'not known'
+    if true_deg is not None:
+        true = (
+            f'{watcher.projection.focal_px * math.radians(true_deg):.2f} px ({true_deg:.2f} deg)'
+        )
+    found = 'no overlap'
+    if overlap.found:
+        found = f'{overlap.offset_x_px:.2f} px ({overlap.offset_deg:.2f} deg)'
+    print(f'Offset: found {found}, true {true}')
+    print(f'Confidence {overlap.confidence:.2f}, by {overlap.method}')
+    seconds = (watcher.stamps_ns[-1] - watcher.stamps_ns[0]) / 1e9
+    p50, p99 = np.percentile(watcher.latencies_ms, (50, 99))
+    print(
+        f'{len(watcher.stamps_ns)} panoramas of {watcher.newest.width}x{watcher.newest.height} '
+        f'px, {(len(watcher.stamps_ns) - 1) / seconds:.1f} a second; '
+        f'latency {p50:.0f} ms (p99 {p99:.0f} ms) from camera to subscriber'
+    )
+
+
+def true_offset_deg(folder: Path | None) -> float | None:
+    """Give the offset that is known of a rig, deg; None where none is."""
+    if folder is None:
+        return SYNTHETIC_OFFSET_DEG
+    path = folder / 'truth.json'
+    truth = json.loads(path.read_text()) if path.is_file() else {}
+    return truth.get('offset_deg') if truth.get('overlaps') else None
+
+
+if __name__ == '__main__':
+    try:
+        sys.exit(main())
+    except (FisheyeError, RuntimeError, TimeoutError) as error:
+        sys.exit(f'The demonstration failed: {error}')
+    except KeyboardInterrupt:
+        sys.exit(130)

@@ -1,0 +1,134 @@
+"""A rig as real processes: the installed executables in a ROS domain of their own."""
+
+import os
+import random
+import signal
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from ament_index_python.packages import get_package_prefix
+
+EXECUTABLES = {
+    'capture': 'fisheye_capture',
+    'undistort': 'fisheye_undistort',
+    'stitch': 'panorama_stitch',
+    'panorama': 'panorama_stitch',
+    'viewer': 'panorama_stitch',
+}
+SIDES = ('left', 'right')
+SEPARATE = ('left/capture', 'right/capture', 'left/undistort', 'right/undistort', 'stitch')
+"""The five nodes of a rig; `COMPOSED` does the same in one."""
+COMPOSED = ('panorama',)
+_STOP_TIMEOUT_S = 10.0
+
+
+def executable(node: str) -> Path:
+    """Give the path that `ros2 run` resolves for a node such as `left/capture`."""
+    name = node.split('/')[-1]
+    package = EXECUTABLES[name]
+    return Path(get_package_prefix(package)) / 'lib' / package / f'{name}_node'
+
+
+def unused_domain() -> int:
+    """Pick a ROS domain that a system beside this one hardly uses."""
+    return random.randint(1, 100)
+
+
+def wait_for(condition: Callable[[], object], timeout_s: float, what: str) -> object:
+    """Poll until a condition holds and give its value; a `TimeoutError` that says what was due."""
+    deadline = time.monotonic() + timeout_s
+    while not (value := condition()):
+        if time.monotonic() > deadline:
+            raise TimeoutError(f'{what} did not happen within {timeout_s:g} s')
+        time.sleep(0.02)
+    return value
+
+
+def camera_parameters(folder: Path | None) -> dict[str, dict[str, object]]:
+    """Give the parameters of each side's capture for a folder of pictures; None: synthetic."""
+    if folder is None:
+        return {side: {} for side in SIDES}
+    return {
+        side: {
+            'source': str(folder / f'{side}.png'),
+            'camera_info_url': str(folder / f'{side}.yaml'),
+        }
+        for side in SIDES
+    }
+
+
+class Rig:
+    """Processes of nodes; as a context manager it ends them all.
+
+    Attributes
+    ----------
+    processes : dict
+        `subprocess.Popen` by node, as `left/capture`.
+    """
+
+    def __init__(self, domain: int, log_folder: Path, environment: dict[str, str] | None = None):
+        self.processes: dict[str, subprocess.Popen] = {}
+        self._log_folder = log_folder
+        self._log_folder.mkdir(parents=True, exist_ok=True)
+        self._environment = {**os.environ, 'ROS_DOMAIN_ID': str(domain), **(environment or {})}
+
+    def __enter__(self) -> 'Rig':
+        return self
+
+    def __exit__(self, *_) -> None:
+        for process in self.processes.values():
+            if process.poll() is None:
+                process.send_signal(signal.SIGINT)
+        for node in self.processes:
+            self._wait(node)
+
+    def start(self, node: str, prefix: tuple[str, ...] = (), **parameters: object) -> None:
+        """Start a node with parameters; the words of `prefix` go before the command."""
+        namespace = node.rpartition('/')[0]
+        command = [*prefix, str(executable(node)), '--ros-args', '-r', f'__ns:=/{namespace}']
+        for name, value in parameters.items():
+            command += ['-p', f'{name}:={value}']
+        with self.log(node).open('ab') as log:
+            self.processes[node] = subprocess.Popen(
+                command, stdout=log, stderr=log, env=self._environment, stdin=subprocess.DEVNULL
+            )
+
+    def start_all(self, composed: bool, cameras: dict[str, dict[str, object]], **capture: object):
+        """Start a whole rig: `cameras` of `camera_parameters`, `capture` for both captures."""
+        if composed:
+            own = {
+                f'{s}.{name}': v for s, entries in cameras.items() for name, v in entries.items()
+            }
+            self.start('panorama', **own, **capture)
+            return
+        for side, entries in cameras.items():
+            self.start(f'{side}/capture', **entries, **capture)
+            self.start(f'{side}/undistort')
+        self.start('stitch')
+
+    def stop(self, node: str, with_signal: signal.Signals = signal.SIGINT) -> tuple[int, float]:
+        """End a node; give its exit code and how long it took, s."""
+        begin = time.monotonic()
+        self.processes[node].send_signal(with_signal)
+        return self._wait(node), time.monotonic() - begin
+
+    def log(self, node: str) -> Path:
+        """Give the file that holds what a node prints."""
+        return self._log_folder / f'{node.replace("/", "_")}.log'
+
+    def check_alive(self) -> None:
+        """Raise a `RuntimeError` with the last words of a node that ended."""
+        for node, process in self.processes.items():
+            if process.poll() is not None:
+                words = self.log(node).read_text(errors='replace').strip()[-2000:]
+                raise RuntimeError(f'{node} ended with code {process.returncode}:\n{words}')
+
+    def _wait(self, node: str) -> int:
+        process = self.processes[node]
+        try:
+            return process.wait(_STOP_TIMEOUT_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            return process.wait()

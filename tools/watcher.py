@@ -1,0 +1,93 @@
+"""A subscriber like a teleoperation stack: takes panoramas and knows what came and when."""
+
+import threading
+import time
+from contextlib import suppress
+
+import numpy as np
+import rclpy
+from fisheye_msgs.msg import Overlaps, Projection
+from fisheye_msgs.srv import CalibrateOverlap
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.time import Time
+from sensor_msgs.msg import Image
+
+from fisheye_bridge.images import to_array
+from fisheye_bridge.qos import IMAGE, LATCHED
+
+
+class Watcher:
+    """Subscribes to a rig's panorama from a ROS context of its own.
+
+    Attributes
+    ----------
+    stamps_ns, latencies_ms : list
+        Of every panorama that came.
+    newest : Image or None
+        The last one.
+    projection, overlaps
+        The last messages of these topics, None before the first.
+    """
+
+    def __init__(self, domain: int, namespace: str = ''):
+        self.stamps_ns: list[int] = []
+        self.latencies_ms: list[float] = []
+        self.newest = self.projection = self.overlaps = None
+        self._context = rclpy.Context()
+        rclpy.init(context=self._context, domain_id=domain)
+        self.node = rclpy.create_node('watcher', context=self._context, namespace=namespace)
+        for kind, topic, take, qos in (
+            (Image, 'panorama/image', self._take, IMAGE),
+            (Projection, 'panorama/projection', self._take_projection, LATCHED),
+            (Overlaps, 'panorama/overlap', self._take_overlaps, LATCHED),
+        ):
+            self.node.create_subscription(kind, topic, take, qos)
+        self._client = self.node.create_client(CalibrateOverlap, 'calibrate_overlap')
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+        self._thread = threading.Thread(target=self._spin, daemon=True)
+        self._thread.start()
+
+    def __enter__(self) -> 'Watcher':
+        return self
+
+    def __exit__(self, *_) -> None:
+        self._executor.shutdown()
+        self._thread.join()
+        self.node.destroy_node()
+        rclpy.shutdown(context=self._context)
+
+    def restart(self) -> None:
+        """Forget what came so far."""
+        self.stamps_ns, self.latencies_ms = [], []
+
+    def picture(self) -> np.ndarray:
+        """Give a copy of the newest panorama."""
+        return to_array(self.newest)[0].copy()
+
+    def calibrate(self, timeout_s: float = 20.0, **request) -> CalibrateOverlap.Response:
+        """Call the rig's calibrate_overlap service."""
+        if not self._client.wait_for_service(timeout_s):
+            raise TimeoutError(f'calibrate_overlap was not offered within {timeout_s:g} s')
+        done = threading.Event()
+        future = self._client.call_async(CalibrateOverlap.Request(**request))
+        future.add_done_callback(lambda _: done.set())
+        if not done.wait(timeout_s):
+            raise TimeoutError(f'calibrate_overlap gave no answer within {timeout_s:g} s')
+        return future.result()
+
+    def _spin(self) -> None:
+        with suppress(ExternalShutdownException):
+            self._executor.spin()
+
+    def _take(self, message) -> None:
+        stamp_ns = Time.from_msg(message.header.stamp).nanoseconds
+        self.stamps_ns.append(stamp_ns)
+        self.latencies_ms.append((time.time_ns() - stamp_ns) / 1e6)
+        self.newest = message
+
+    def _take_projection(self, message) -> None:
+        self.projection = message
+
+    def _take_overlaps(self, message) -> None:
+        self.overlaps = message
