@@ -1,8 +1,9 @@
-"""Parameters of a camera: what it is, and in what form its pictures are wanted."""
+"""Settings of a camera: the only place with their defaults."""
 
 from dataclasses import dataclass, replace
 from math import isnan, nan
 
+from fisheye_geometry.lens import MAX_PICTURE_SIDE_PX
 from fisheye_geometry.settings import setting
 
 
@@ -11,24 +12,36 @@ class FrameSettings:
     """What the cameras of a rig have in common."""
 
     frame_rate_hz: float = setting(
-        30.0, 'frames a second that are asked of the source', minimum=0.1, maximum=1000
+        30.0, 'Pictures a second that are asked of the source.', minimum=0.1, maximum=1000.0
     )
     width: int = setting(
-        0, 'width of the pictures, px; 0: what the source gives', minimum=0, maximum=16384
+        0,
+        'Width asked of a device or of the synthetic camera, px; 0: its own.',
+        minimum=0,
+        maximum=MAX_PICTURE_SIDE_PX,
     )
     height: int = setting(
-        0, 'height of the pictures, px; 0: what the source gives', minimum=0, maximum=16384
+        0,
+        'Height asked of a device or of the synthetic camera, px; 0: its own.',
+        minimum=0,
+        maximum=MAX_PICTURE_SIDE_PX,
     )
-    pixel_format: str = setting('MJPG', 'FOURCC asked of a device; empty: its own default')
-    loop: bool = setting(True, 'start a video or a folder of pictures again at its end')
+    pixel_format: str = setting('MJPG', 'Four letters (FOURCC) asked of a device; empty: its own.')
+    loop: bool = setting(True, 'Start a video or a folder of pictures again at its end.')
     encoding: str = setting(
-        'bgr8', 'encoding of the published pictures', choices=('bgr8', 'mono8', 'rgb8')
+        'bgr8', 'Encoding of the published pictures.', choices=('bgr8', 'mono8', 'rgb8')
     )
     reconnect_max_s: float = setting(
-        5.0, 'longest wait between two attempts to reopen a lost source', minimum=0.1, maximum=3600
+        2.0,
+        'Longest wait between two attempts to reopen a camera that was lost.',
+        minimum=0.1,
+        maximum=3600.0,
     )
     synthetic_fov_deg: float = setting(
-        170.0, 'field of view of the synthetic camera across the picture', minimum=30, maximum=240
+        170.0,
+        'Field of view of the synthetic camera across its picture.',
+        minimum=30.0,
+        maximum=240.0,
     )
 
 
@@ -38,24 +51,24 @@ class CameraSettings:
 
     source: str = setting(
         'synthetic',
-        "'synthetic', a device (0, /dev/video0), a picture, a folder or glob of pictures, a video "
-        'file, or an http, rtsp or udp URL',
+        'synthetic, a device (0, /dev/video0), a picture, a folder or glob of pictures, a video, '
+        'or an http, rtsp or udp URL.',
     )
     camera_info_url: str = setting(
-        '', 'calibration file: a path, file:// or package://; empty: none (synthetic: its own)'
+        '', 'Calibration file: a path, file:// or package://; empty: none (synthetic: its own).'
     )
-    camera_name: str = setting('', 'name of the camera; empty: the last part of the namespace')
-    frame_id: str = setting('', 'frame of the pictures; empty: CAMERA_NAME_optical_frame')
+    camera_name: str = setting('', 'Name of the camera; empty: the last part of the namespace.')
+    frame_id: str = setting('', 'Frame of the pictures; empty: the name and _optical_frame.')
     synthetic_yaw_deg: float = setting(
         nan,
-        'where the synthetic camera looks, positive to the right; NaN: -70 for a camera called '
-        'left, 70 for right, else 0',
-        minimum=-180,
-        maximum=180,
+        'Where the synthetic camera looks, positive to the right; NaN: -70 for a camera called '
+        'left, 70 for right, 0 for any other.',
+        minimum=-180.0,
+        maximum=180.0,
         nan=True,
     )
     synthetic_gain: float = setting(
-        1.0, 'exposure of the synthetic camera', minimum=0.05, maximum=20
+        1.0, 'Exposure of the synthetic camera.', minimum=0.05, maximum=20.0
     )
 
     def named(self, name: str) -> 'CameraSettings':
@@ -82,4 +95,8 @@ _USUAL_YAW_DEG = {'left': -70.0, 'right': 70.0}
 
 @dataclass(frozen=True)
 class CaptureSettings(CameraSettings, FrameSettings):
-    """Parameters of capture_node."""
+    """Settings of the capture node."""
+
+    jpeg_quality: int = setting(
+        80, 'Quality of the compressed pictures.', minimum=1, maximum=100, live=True
+    )

@@ -1,0 +1,49 @@
+"""Where a camera's calibration is: `camera_info_url` as ROS writes it, or a plain path."""
+
+from pathlib import Path
+from urllib.parse import unquote
+
+from ament_index_python.packages import get_package_share_directory
+
+from fisheye_geometry.camera_file import Camera, read_camera
+from fisheye_geometry.errors import CameraFileError
+
+
+def calibration_of(url: str) -> Camera | None:
+    """Read the camera that a URL names; None for an empty one.
+
+    Raises
+    ------
+    CameraFileError
+        If the URL means nothing, or its file describes no camera.
+    """
+    path = calibration_path(url)
+    return None if path is None else read_camera(path)
+
+
+def calibration_path(url: str) -> Path | None:
+    """Give the file that a path, a `file://` or a `package://` URL names; None for an empty one.
+
+    Raises
+    ------
+    CameraFileError
+        For another scheme, and for a package that is not installed.
+    """
+    if not url:
+        return None
+    scheme, mark, rest = url.partition('://')
+    if not mark:
+        return Path(url).expanduser()
+    if scheme == 'file':
+        return Path(unquote(rest))
+    if scheme != 'package':
+        raise CameraFileError(
+            f"camera_info_url '{url}' has the scheme '{scheme}'; expected a path, file:// or package://"
+        )
+    package, _, path = unquote(rest).partition('/')
+    try:
+        return Path(get_package_share_directory(package), path)
+    except (LookupError, ValueError, OSError) as error:
+        raise CameraFileError(
+            f"camera_info_url '{url}': there is no package '{package}'"
+        ) from error

@@ -1,0 +1,136 @@
+"""One camera as a node: its pictures, and beside each what the camera sees."""
+
+import numpy as np
+from rclpy.node import Node
+from rclpy.time import Time
+from sensor_msgs.msg import CameraInfo
+from sensor_msgs.srv import SetCameraInfo
+from std_msgs.msg import Header
+
+from fisheye_bridge.camera_info import camera_info_of, camera_of
+from fisheye_bridge.diagnostics import ERROR, WARN, Diagnostics
+from fisheye_bridge.images import ImageBuffer
+from fisheye_bridge.parameters import Parameters
+from fisheye_bridge.qos import IMAGE
+from fisheye_bridge.running import run
+from fisheye_bridge.topics import ImagePublisher
+from fisheye_capture.calibration_url import calibration_path
+from fisheye_capture.grabber import Grabber
+from fisheye_capture.newest import Newest
+from fisheye_capture.settings import CaptureSettings
+from fisheye_capture.source import Frame
+from fisheye_geometry.camera_file import Camera, read_camera, write_camera
+from fisheye_geometry.errors import CameraFileError, FisheyeError
+
+
+class CaptureNode(Node):
+    """A source of pictures to image_raw and camera_info."""
+
+    def __init__(self, **kwargs):
+        super().__init__('capture', **kwargs)
+        self._parameters = Parameters(self, CaptureSettings)
+        name = self.get_namespace().rsplit('/', 1)[-1] or 'camera'
+        self._settings = self._parameters.settings.named(name)
+        self._calibration_path = calibration_path(self._settings.camera_info_url)
+        self._image = ImagePublisher(self, 'image_raw')
+        self._camera_info = self.create_publisher(CameraInfo, 'camera_info', IMAGE)
+        self._buffer: ImageBuffer | None = None
+        self._info, self._described, self._fault = CameraInfo(), None, ''
+        self._publishing = Newest(self._publish, 'publish')
+        self._grabber = Grabber(self._settings, self._publishing.put, on_change=self._tell)
+        self._camera = self._calibration()
+        self.create_service(SetCameraInfo, 'set_camera_info', self._set_camera_info)
+        self._diagnostics = Diagnostics(self, self._report)
+        if self._grabber.reason:
+            self._tell(self._grabber.reason)
+        self._grabber.start()
+
+    def destroy_node(self) -> None:
+        """Release the camera and end the threads too."""
+        self._grabber.stop()
+        self._publishing.stop()
+        super().destroy_node()
+
+    def _calibration(self) -> Camera | None:
+        """Give the camera of the calibration file, else what the source knows of itself."""
+        path = self._calibration_path
+        if path is None:
+            return self._grabber.camera
+        if not path.exists():
+            self.get_logger().warning(f'{path} is not there yet; set_camera_info writes it')
+            return None
+        return read_camera(path)
+
+    def _publish(self, frame: Frame) -> None:
+        image, encoding = frame.image, self._settings.encoding
+        height, width = image.shape[:2]
+        stamp = Time(nanoseconds=frame.stamp_ns).to_msg()
+        header = Header(stamp=stamp, frame_id=self._settings.frame_id)
+        if self._described != (self._camera, width, height):
+            self._describe(self._camera, width, height)
+        if self._image.wanted:
+            if self._buffer is None or not self._buffer.fits(width, height, encoding):
+                self._buffer = ImageBuffer(width, height, encoding)
+            np.copyto(self._buffer.array, image)
+            self._buffer.message.header = header
+            self._image.publish(
+                self._buffer.message, image, self._parameters.settings.jpeg_quality
+            )
+        self._info.header = header
+        self._camera_info.publish(self._info)
+
+    def _describe(self, camera: Camera | None, width: int, height: int) -> None:
+        """Prepare the camera_info of pictures of this size; without K if it is not known."""
+        self._described = camera, width, height
+        self._fault = ''
+        if camera is None:
+            self._fault = 'the camera is not calibrated'
+        elif (camera.lens.width, camera.lens.height) != (width, height):
+            self._fault = (
+                f'the calibration is for {camera.lens.width}x{camera.lens.height} px; '
+                f'the pictures have {width}x{height} px'
+            )
+        if self._fault:
+            self._info = CameraInfo(width=width, height=height)
+            self.get_logger().warning(f'{self._fault}: camera_info is published without K')
+        else:
+            self._info = camera_info_of(camera, Header())
+
+    def _set_camera_info(self, request, response):
+        """Write the calibration file and use it from the next picture on."""
+        try:
+            if self._calibration_path is None:
+                raise CameraFileError('camera_info_url is empty; expected the file to write')
+            camera = camera_of(request.camera_info, self._settings.camera_name)
+            write_camera(self._calibration_path, camera)
+        except FisheyeError as error:
+            response.success, response.status_message = False, str(error)
+            return response
+        self._camera = camera
+        response.success, response.status_message = True, f'written to {self._calibration_path}'
+        return response
+
+    def _tell(self, reason: str) -> None:
+        if reason:
+            self.get_logger().warning(f'no pictures: {reason}')
+        else:
+            note = self._grabber.note
+            self.get_logger().info('pictures come' + (f'; {note}' if note else ''))
+
+    def _report(self, report) -> None:
+        grabber = self._grabber
+        if grabber.reason:
+            report.add(ERROR, f'{grabber.reason} (attempts to reopen: {grabber.attempts})')
+        if grabber.note:
+            report.add(WARN, grabber.note)
+        if self._fault:
+            report.add(WARN, self._fault)
+        report.values['source'] = self._settings.source
+        report.values['rate Hz'] = grabber.rate_hz
+        report.values['pictures'] = grabber.frames
+        report.values['pictures skipped'] = grabber.skipped + self._publishing.dropped
+
+
+def main() -> int:
+    """Run the node."""
+    return run(CaptureNode)

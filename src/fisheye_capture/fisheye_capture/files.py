@@ -1,0 +1,85 @@
+"""Sources on disk: a picture, several pictures, a video."""
+
+from collections.abc import Iterator, Sequence
+from itertools import chain
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from fisheye_capture.pace import PacedSource
+from fisheye_capture.settings import CaptureSettings
+from fisheye_capture.source import SourceEndedError, encoded
+from fisheye_geometry.errors import SourceError
+
+PICTURE_SUFFIXES = frozenset(
+    {'.bmp', '.jp2', '.jpeg', '.jpg', '.pbm', '.pgm', '.png', '.ppm', '.tif', '.tiff', '.webp'}
+)
+# The pixels as the sensor gave them: a calibration knows nothing of a turned picture.
+_AS_TAKEN = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
+
+
+class PictureSource(PacedSource):
+    """One picture for ever, decoded once; the array is read-only and always the same."""
+
+    def __init__(self, settings: CaptureSettings, path: Path):
+        super().__init__(settings.frame_rate_hz)
+        self._image = encoded(_read(path), settings.encoding)
+        self._image.setflags(write=False)
+
+    def _picture(self, stamp_ns):
+        return self._image
+
+
+class SequenceSource(PacedSource):
+    """Pictures in turn, all of one size: those of a folder or the frames of a video."""
+
+    def __init__(self, settings: CaptureSettings, pictures: Iterator[tuple[str, np.ndarray]]):
+        """Take the pictures, each with a name; their end is the end of the source."""
+        super().__init__(settings.frame_rate_hz)
+        self._encoding = settings.encoding
+        first = next(pictures)
+        self._shape = first[1].shape
+        self._pictures = chain([first], pictures)
+
+    def _picture(self, stamp_ns):
+        name, image = next(self._pictures, (None, None))
+        if name is None:
+            raise SourceEndedError('the last picture was shown (loop is false)')
+        if image.shape != self._shape:
+            raise SourceError(
+                f'{name} has {image.shape[1]}x{image.shape[0]} px; '
+                f'the pictures before it have {self._shape[1]}x{self._shape[0]} px'
+            )
+        return encoded(image, self._encoding)
+
+
+def folder_pictures(paths: Sequence[Path], loop: bool) -> Iterator[tuple[str, np.ndarray]]:
+    """Give pictures in turn; a `SourceError` for one that cannot be read."""
+    while True:
+        for path in paths:
+            yield str(path), _read(path)
+        if not loop:
+            return
+
+
+def video_pictures(path: Path, loop: bool) -> Iterator[tuple[str, np.ndarray]]:
+    """Give the frames of a video; a `SourceError` if it has none."""
+    while True:
+        video = cv2.VideoCapture(str(path))
+        frames = 0
+        while (image := video.read()[1]) is not None:
+            frames += 1
+            yield f'frame {frames} of {path}', image
+        video.release()
+        if not frames:
+            raise SourceError(f'{path} cannot be read as a video or a picture')
+        if not loop:
+            return
+
+
+def _read(path: Path) -> np.ndarray:
+    image = cv2.imread(str(path), _AS_TAKEN)
+    if image is None:
+        raise SourceError(f'{path} cannot be read as a picture')
+    return image

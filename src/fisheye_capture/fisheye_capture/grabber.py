@@ -1,0 +1,139 @@
+"""Grabbing: a thread that reads a source for ever, and gets it back when it is lost."""
+
+import time
+from collections import deque
+from collections.abc import Callable
+from threading import Event, Thread
+
+from fisheye_capture.settings import CaptureSettings
+from fisheye_capture.source import Frame, Source, SourceEndedError, SourceLostError
+from fisheye_capture.sources import open_source
+from fisheye_geometry.errors import SourceError
+
+_FIRST_WAIT_S = 0.25
+"""Before the first attempt to reopen; doubled before each further one."""
+_STOP_TIMEOUT_S = 1.5
+_RATE_FRAMES = 60
+"""Frames over which the rate is measured."""
+
+
+class Grabber:
+    """Hands over the frames of a source, and reopens it for as long as it takes.
+
+    Attributes
+    ----------
+    camera
+        What the camera sees, where the source itself knows it.
+    reason
+        Why there are no frames now; '' while they come.
+    attempts
+        Vain attempts to reopen the source since it was lost.
+    frames
+        Frames handed over so far.
+    """
+
+    def __init__(
+        self,
+        settings: CaptureSettings,
+        on_frame: Callable[[Frame], None],
+        *,
+        on_change: Callable[[str], None] = lambda reason: None,
+    ):
+        """Open the source; `start` begins to read it.
+
+        Parameters
+        ----------
+        settings
+            What to open.
+        on_frame
+            Called with each frame in the reading thread; the sooner it returns, the better.
+        on_change
+            Called in the reading thread with `reason` when the frames stop and when they come.
+
+        Raises
+        ------
+        SourceError
+            If the source can give no frame ever; a camera that is not there yet is waited for.
+        """
+        self._settings = settings
+        self._on_frame = on_frame
+        self._on_change = on_change
+        self._arrivals_s = deque(maxlen=_RATE_FRAMES)
+        self._stopping = Event()
+        self._thread = Thread(target=self._run, name=f'grab {settings.camera_name}', daemon=True)
+        self.reason = 'waiting for the first picture'
+        self.attempts = self.frames = 0
+        self._source: Source | None = None
+        try:
+            self._source = open_source(settings)
+        except SourceLostError as error:
+            self.reason = str(error)
+        self.camera = self._source.camera if self._source else None
+
+    @property
+    def note(self) -> str:
+        """What a user should know of how the source was opened."""
+        return self._source.note if self._source else ''
+
+    @property
+    def skipped(self) -> int:
+        """Frames of the open source that were due while the one before was still in work."""
+        return self._source.skipped if self._source else 0
+
+    @property
+    def rate_hz(self) -> float:
+        """Frames a second of late; sinks while none come."""
+        if len(self._arrivals_s) < 2:
+            return 0.0
+        return (len(self._arrivals_s) - 1) / (time.monotonic() - self._arrivals_s[0])
+
+    def start(self) -> None:
+        """Begin to read."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End at once, whatever the source is doing, and release it."""
+        self._stopping.set()
+        if source := self._source:
+            source.interrupt()
+        if self._thread.is_alive():
+            self._thread.join(_STOP_TIMEOUT_S)
+        elif source:
+            source.close()
+
+    def _run(self):
+        wait_s = _FIRST_WAIT_S
+        while not self._stopping.is_set():
+            frames = self.frames
+            try:
+                self._source = self._source or open_source(self._settings)
+                self._read(self._source)
+            except SourceEndedError as error:
+                self._change(str(error))
+                self._stopping.wait()
+            except SourceError as error:
+                came = self.frames > frames
+                self.attempts = 0 if came else self.attempts + 1
+                wait_s = _FIRST_WAIT_S if came else min(2 * wait_s, self._settings.reconnect_max_s)
+                self._change(str(error))
+            finally:
+                self._release()
+            self._stopping.wait(wait_s)
+
+    def _read(self, source):
+        while not self._stopping.is_set():
+            frame = source.read()
+            self.frames += 1
+            self._arrivals_s.append(time.monotonic())
+            self._change('')
+            self._on_frame(frame)
+
+    def _change(self, reason):
+        if reason != self.reason and not self._stopping.is_set():
+            self.reason = reason
+            self._on_change(reason)
+
+    def _release(self):
+        if self._source:
+            self._source.close()
+            self._source = None

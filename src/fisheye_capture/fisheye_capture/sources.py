@@ -1,0 +1,65 @@
+"""Which kind of source a name means."""
+
+import re
+from glob import glob
+from pathlib import Path
+
+from fisheye_capture.files import (
+    PICTURE_SUFFIXES,
+    PictureSource,
+    SequenceSource,
+    folder_pictures,
+    video_pictures,
+)
+from fisheye_capture.live import DeviceSource
+from fisheye_capture.settings import CaptureSettings
+from fisheye_capture.source import Source
+from fisheye_capture.stream import StreamSource
+from fisheye_capture.synthetic import SyntheticSource
+from fisheye_geometry.errors import SourceError
+
+_STREAMS = ('http', 'https', 'rtsp', 'rtsps', 'udp')
+
+
+def open_source(settings: CaptureSettings) -> Source:
+    """Open what `settings.source` names.
+
+    Raises
+    ------
+    SourceLostError
+        If a camera is not there; it may come.
+    SourceError
+        If the name means nothing, or a file cannot be read.
+    """
+    source = settings.source
+    if source == 'synthetic':
+        return SyntheticSource(settings)
+    if re.fullmatch('[0-9]+|/dev/.+', source):
+        return DeviceSource(settings)
+    scheme, mark, rest = source.partition('://')
+    if mark and scheme in _STREAMS:
+        return StreamSource(settings)
+    if mark and scheme != 'file':
+        raise SourceError(
+            f"source '{source}' has the scheme '{scheme}'; expected one of "
+            f'{", ".join(_STREAMS)} or file'
+        )
+    return _open_files(settings, Path(rest if mark else source).expanduser())
+
+
+def _open_files(settings: CaptureSettings, path: Path) -> Source:
+    if path.is_file():
+        if path.suffix.lower() in PICTURE_SUFFIXES:
+            return PictureSource(settings, path)
+        return SequenceSource(settings, video_pictures(path, settings.loop))
+    pattern = path / '*' if path.is_dir() else path
+    paths = [Path(name) for name in sorted(glob(str(pattern), recursive=True))]
+    pictures = [entry for entry in paths if entry.suffix.lower() in PICTURE_SUFFIXES]
+    if pictures:
+        return SequenceSource(settings, folder_pictures(pictures, settings.loop))
+    if path.is_dir() or paths:
+        raise SourceError(f'there is no picture in {path}')
+    raise SourceError(
+        f"source '{settings.source}' is not there; expected synthetic, a device, a picture, a "
+        'folder or glob of pictures, a video, or an http, rtsp or udp URL'
+    )
