@@ -2,13 +2,12 @@
 
 import threading
 import time
-from contextlib import suppress
 
 import numpy as np
 import rclpy
 from fisheye_msgs.msg import Overlaps, Projection
 from fisheye_msgs.srv import CalibrateOverlap
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.time import Time
 from sensor_msgs.msg import Image
 
@@ -45,6 +44,7 @@ class Watcher:
         self._client = self.node.create_client(CalibrateOverlap, 'calibrate_overlap')
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
+        self._is_done = False
         self._thread = threading.Thread(target=self._spin, daemon=True)
         self._thread.start()
 
@@ -52,8 +52,9 @@ class Watcher:
         return self
 
     def __exit__(self, *_) -> None:
-        self._executor.shutdown()
+        self._is_done = True
         self._thread.join()
+        self._executor.shutdown()
         self.node.destroy_node()
         rclpy.shutdown(context=self._context)
 
@@ -77,8 +78,8 @@ class Watcher:
         return future.result()
 
     def _spin(self) -> None:
-        with suppress(ExternalShutdownException):
-            self._executor.spin()
+        while not self._is_done:
+            self._executor.spin_once(timeout_sec=0.1)
 
     def _take(self, message) -> None:
         stamp_ns = Time.from_msg(message.header.stamp).nanoseconds

@@ -29,12 +29,12 @@ class UndistortNode(Node):
         self._correction = self._buffer = None
         self._refusal = ''
         self._frames = self._corrected = 0
-        self._parameters = Parameters(self, UndistortSettings, on_change=self._rebuild)
+        self._declared = Parameters(self, UndistortSettings, on_change=self._rebuild)
         self._image = self.create_publisher(Image, 'image_rect', IMAGE)
         self._projection = self.create_publisher(Projection, 'projection', LATCHED)
         self.create_subscription(CameraInfo, 'camera_info', self._take_camera_info, IMAGE)
         self._input = ImageSubscription(
-            self, 'image_raw', self._take_image, transport=self._parameters.settings.transport
+            self, 'image_raw', self._take_image, transport=self._declared.settings.transport
         )
         self._diagnostics = Diagnostics(self, self._report)
 
@@ -52,7 +52,7 @@ class UndistortNode(Node):
         self._header = message.header
         self._circle = ImageCircle(self._camera.lens)
         self._frames = 0
-        self._rebuild(self._parameters.settings)
+        self._rebuild(self._declared.settings)
 
     def _rebuild(self, settings):
         """Have the maps built in the background; frames use the old ones until then."""
@@ -92,7 +92,7 @@ class UndistortNode(Node):
         self._frames += 1
         power_of_two = self._frames & (self._frames - 1) == 0
         if self._circle and power_of_two and self._circle.look(image):
-            self._rebuild(self._parameters.settings)
+            self._rebuild(self._declared.settings)
 
     def _report(self, report):
         if self._correction is None:

@@ -36,7 +36,7 @@ class PanoramaBase(Node):
 
     def __init__(self, name: str, settings: type[PanoramaOutputSettings], **kwargs):
         super().__init__(name, **kwargs)
-        self._parameters = Parameters(self, settings, on_change=self._apply)
+        self._declared = Parameters(self, settings, on_change=self._apply)
         cameras = self.settings.cameras
         if len(set(cameras)) != len(cameras) or len(cameras) < 2:
             raise SettingError(
@@ -63,7 +63,7 @@ class PanoramaBase(Node):
     @property
     def settings(self) -> PanoramaOutputSettings:
         """The current values of the parameters."""
-        return self._parameters.settings
+        return self._declared.settings
 
     def take(self, camera: str, stamp_ns: int, image: np.ndarray, encoding: str) -> None:
         """Take a frame of a camera; the first one decides the panorama's encoding."""

@@ -1,0 +1,46 @@
+"""What the tests across packages share: real pictures and real processes."""
+
+import os
+from pathlib import Path
+
+import pytest
+from rig import Rig, unused_domain
+from watcher import Watcher
+
+DATA = Path(os.environ.get('FISHEYE_DATA', Path(__file__).parents[2] / 'shared' / 'data'))
+
+
+@pytest.fixture
+def real_rig():
+    """Give the folder of a rig of real pictures by its name."""
+
+    def folder(name: str) -> Path:
+        path = DATA / 'rigs' / name
+        if not path.is_dir():
+            message = f'{path} is not there: real pictures are looked for in $FISHEYE_DATA'
+            if os.environ.get('REQUIRE_DATA') == '1':
+                pytest.fail(message)
+            pytest.skip(message)
+        return path
+
+    return folder
+
+
+@pytest.fixture
+def domain() -> int:
+    """Give a ROS domain of the test's own."""
+    return unused_domain()
+
+
+@pytest.fixture
+def rig(domain, tmp_path):
+    """Give an empty rig, whose processes end with the test."""
+    with Rig(domain, tmp_path / 'log') as rig:
+        yield rig
+
+
+@pytest.fixture
+def watcher(domain):
+    """Give a subscriber in the rig's domain."""
+    with Watcher(domain) as watcher:
+        yield watcher
