@@ -1,23 +1,25 @@
 """The whole line as users run it: installed executables, real DDS, a subscriber of its own."""
 
+import json
 import math
 import os
 import signal
 import time
 
-import numpy as np
 import pytest
-from fisheye_bridge.camera_info import camera_of
+from rclpy.time import Time
 from rig import COMPOSED, SEPARATE, camera_parameters, wait_for
 from sensor_msgs.msg import CameraInfo, CompressedImage
+
+from fisheye_bridge.camera_info import camera_of
 
 RATE_HZ = 30.0
 WATCHED_S = float(os.environ.get('WATCHED_S', '8'))
 START_S = 40.0
 STOP_S = 2.0
 CLOSE_PX = 1.0
-LEVEL_GAIN_STEP = 12
-"""Grey levels by which neighbouring columns at a seam may differ more than elsewhere."""
+SCHEDULING = 0.2
+"""Share of the frames that a busy machine may not even take."""
 
 
 def start(rig, watcher, *, composed=False, folder=None, **capture):
@@ -26,18 +28,38 @@ def start(rig, watcher, *, composed=False, folder=None, **capture):
     wait_for(lambda: watcher.overlaps and watcher.projection, START_S, 'the latched topics')
 
 
+def captured_stamps(watcher):
+    """Give the set that fills with the stamps that both cameras took."""
+    seen, both = {'left': set(), 'right': set()}, set()
+
+    def take(side, message):
+        stamp = Time.from_msg(message.header.stamp).nanoseconds
+        seen[side].add(stamp)
+        if stamp in seen['left'] & seen['right']:
+            both.add(stamp)
+
+    for side in seen:
+        watcher.node.create_subscription(
+            CameraInfo, f'{side}/camera_info', lambda m, side=side: take(side, m), 10
+        )
+    return both
+
+
 @pytest.mark.parametrize('composed', [False, True], ids=['five nodes', 'one node'])
 def test_every_pair_arrives_and_every_node_ends_at_once(rig, watcher, composed):
     start(rig, watcher, composed=composed)
-    time_to_settle = time.time_ns() + 1_000_000_000
-    wait_for(lambda: watcher.stamps_ns[-1] > time_to_settle, START_S, 'a settled stream')
-    watcher.restart()
-    wait_for(
-        lambda: len(watcher.stamps_ns) > WATCHED_S * RATE_HZ, 3 * WATCHED_S + 10, 'the panoramas'
-    )
-    gaps = np.diff(watcher.stamps_ns) * RATE_HZ / 1e9
-    assert gaps == pytest.approx(1.0, abs=1e-3), 'a stamp of the grid is missing'
-    # Not the executables' fault if a machine is loaded: they are told to end one after the other.
+    captured = set() if composed else captured_stamps(watcher)
+    settled_ns = time.time_ns() + 2_000_000_000
+    end_ns = settled_ns + int(WATCHED_S * 1e9)
+    wait_for(lambda: watcher.stamps_ns[-1] > end_ns, WATCHED_S + START_S, 'the panoramas')
+    came = [stamp for stamp in watcher.stamps_ns if settled_ns <= stamp <= end_ns]
+    assert came == sorted(set(came)), 'each once, in order'
+    if composed:
+        assert len(came) == pytest.approx(WATCHED_S * RATE_HZ, rel=SCHEDULING)
+    else:
+        due = {stamp for stamp in captured if settled_ns <= stamp <= end_ns}
+        assert len(due) > WATCHED_S * RATE_HZ * (1 - SCHEDULING)
+        assert due - set(came) == set(), 'pairs that were captured and got lost'
     for node in reversed(COMPOSED if composed else SEPARATE):
         code, seconds = rig.stop(node)
         assert (node, code) == (node, 0), rig.log(node).read_text()
@@ -63,8 +85,6 @@ def test_the_synthetic_rig_is_stitched_where_it_should_be(rig, watcher):
 
 @pytest.mark.parametrize('name', ['workshop', 'hall', 'forest', 'apartment', 'bridge'])
 def test_real_pictures_are_stitched_where_they_should_be(rig, watcher, real_rig, name):
-    import json
-
     folder = real_rig(name)
     start(rig, watcher, composed=True, folder=folder)
     truth = json.loads((folder / 'truth.json').read_text())
@@ -72,7 +92,8 @@ def test_real_pictures_are_stitched_where_they_should_be(rig, watcher, real_rig,
     true_px = math.radians(truth['offset_deg']) * watcher.projection.focal_px
     assert overlap.found
     assert overlap.offset_x_px == pytest.approx(true_px, abs=CLOSE_PX)
-    assert watcher.picture().any(axis=2).all()
+    lit = watcher.picture().any(axis=2)
+    assert min(lit.mean(axis=0).min(), lit.mean(axis=1).min()) > 0.5, 'no black band'
 
 
 @pytest.mark.parametrize('name', ['apart_lobby', 'apart_mixed'])
@@ -105,13 +126,13 @@ def test_what_a_teleoperation_stack_needs_is_there(rig, watcher):
 
 @pytest.mark.parametrize('with_signal', [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize('node', ['left/capture', 'left/undistort', 'stitch', 'panorama'])
-def test_a_lone_node_ends_at_once(rig, node, with_signal):
-    rig.start(node, **({'left.source': 'http://127.0.0.1:9/'} if node == 'panorama' else {}))
-    if node == 'panorama':
-        wait_for(lambda: rig.processes[node].poll() is not None, START_S, 'a refusal')
-        assert 'camera_info_url' in rig.log(node).read_text()
-        return
-    wait_for(lambda: rig.log(node).exists(), START_S, 'a log')
+def test_a_lone_node_ends_at_once(rig, watcher, node, with_signal):
+    rig.start(node)
+    name = node.split('/')[-1]
+    wait_for(lambda: name in watcher.node.get_node_names(), START_S, f'{node} in the graph')
+    code, seconds = rig.stop(node, with_signal)
+    assert code == 0, rig.log(node).read_text()
+    assert seconds < STOP_S
 
 
 @pytest.mark.parametrize(
@@ -119,7 +140,7 @@ def test_a_lone_node_ends_at_once(rig, node, with_signal):
     [
         ('left/capture', {'frame_rate_hz': 5000}, 'frame_rate_hz is 5000; expected 0.1 to 1000'),
         ('left/capture', {'source': '/none/there.png'}, "'/none/there.png' is not there"),
-        ('left/capture', {'camera_info_url': '/none.yaml'}, '/none.yaml cannot be read'),
+        ('left/capture', {'camera_info_url': 'http://a/b'}, "has the scheme 'http'; expected"),
         ('left/undistort', {'surface': 'spherical'}, "surface is 'spherical'; expected one of"),
         ('stitch', {'blend': 'soft'}, "blend is 'soft'; expected one of"),
         ('stitch', {'cameras': '[left]'}, "cameras is ['left']; expected at least two"),
