@@ -1,12 +1,13 @@
-"""Local shifts over the overlap, and the offset and small turn of the right camera behind them.
+"""The offset, and the small turn of the right camera, that close the seam from top to bottom.
 
-The overlap is cut into tiles; each is looked for near where it is expected, and a robust fit tells
-what they agree on. A tilted camera shifts the rows along the seam differently, which no single
-offset can follow.
+The overlap is cut into tiles, and each is correlated with where it may lie in the left picture. A
+tilted camera shifts the tiles along the seam differently, which no single offset can follow: the
+pose is sought at which the tiles together correlate best.
 """
 
 from dataclasses import dataclass
-from math import ceil, inf, radians
+from itertools import product
+from math import ceil, radians
 
 import cv2
 import numpy as np
@@ -19,14 +20,13 @@ _TILE_RAD = radians(6.0)
 _COLUMNS, _ROWS = 4, 18
 """At most so many tiles across and down the overlap."""
 _SEEN_SHARE = 0.8
-_WORTHLESS = 0.3
-"""Correlation at and below which a tile says nothing about its shift."""
-_CERTAINTY = 40.0
-"""Turns the curvature of a tile's correlation into an inverse variance, 1/px^2."""
 _LIKELY_TILT_RAD = radians(1.5)
 _LIKELY_RISE_RAD = radians(0.5)
 """How far mounts are usually off: what decides where the overlap does not."""
-_ROUNDS = 6
+_TILTS_RAD = tuple(radians(t) for t in (-2.0, -1.0, 0.0, 1.0, 2.0))
+_GRAIN_PX = 6.0
+_SUREST = 0.9
+_WITHIN = (3, 2, 1, 1, 0)
 
 
 @dataclass(frozen=True)
@@ -76,51 +76,156 @@ def align(
     right: Structure,
     surface: Surface,
     start: Pose,
-    level_y_px: float,
+    usual: Pose,
     search_rad: float,
     tilt: bool = True,
 ) -> Alignment:
-    """Refine a pose by tiles.
-
-    Parameters
-    ----------
-    left, right
-        The two pictures at the same scale.
-    surface
-        The right picture's.
-    start
-        The pose to start from, px of these pictures.
-    level_y_px
-        The vertical offset of a level rig.
-    search_rad
-        How far from where it is expected each tile is looked for.
-    tilt
-        Whether the right camera may be turned.
-    """
-    pixels_per_rad = surface.focal_px
-    size = max(8, round(_TILE_RAD * pixels_per_rad))
-    reach = max(2, ceil(search_rad * pixels_per_rad))
-    origins = _tiles(left.valid, right.valid, start, size)
-    responses, tiles = [], []
-    margin = (size - 1) / 2
-    for origin, place in zip(origins, start.place(surface, origins + margin) - margin):
-        tile = _Tile.find(left.detail, right.detail, origin, place, size, reach)
-        if tile is not None:
-            tiles.append(tile)
-    if not tiles:
+    size = max(8, round(_TILE_RAD * surface.focal_px))
+    reach = max(2, ceil(search_rad * surface.focal_px))
+    origins = _tiles(left.valid, right.valid, start, size, reach // 3)
+    if not len(origins):
         return Alignment(start, 0.0, 0)
-    pose = _fit(tiles, surface, start, level_y_px, search_rad, margin, tilt)
-    moved = pose.place(surface, np.array([t.origin for t in tiles]) + margin) - margin
-    weight = np.array([tile.weight for tile in tiles])
-    agreement = np.array([tile.response_near(place) for tile, place in zip(tiles, moved)])
-    return Alignment(pose, float(weight @ agreement / max(weight.sum(), 1e-6)), len(tiles))
+    tiles = _Tiles(left.detail, left.valid, right.detail, surface, start, origins, size, reach)
+    step = tiles.search() if tilt else tiles.search_shift(np.zeros(2))
+    step = tiles.climb(step, start, usual, tilt)
+    pose = Pose(
+        start.x_px + step[0], start.y_px + step[1],
+        start.pitch_rad + step[2], start.roll_rad + step[3],
+    )
+    return Alignment(pose, tiles.agreement(step), len(origins))
 
 
-def _tiles(left_valid, right_valid, pose, size) -> np.ndarray:
+class _Tiles:
+    """Tiles of the right picture and how well each fits around its place in the left one."""
+
+    def __init__(self, left, left_valid, right, surface, start, origins, size, reach):
+        margin = (size - 1) / 2
+        centers = origins + margin
+        places = start.place(surface, centers) - margin
+        self._jacobian = _jacobian(surface, start, centers)
+        self._rounding = np.rint(places) - places
+        self._reach = reach
+        self._scale = surface.focal_px
+        side = 2 * reach + 1
+        self._responses = np.zeros((len(origins), side, side), np.float32)
+        self._known = np.zeros((len(origins), side, side), bool)
+        self._weight = np.zeros(len(origins))
+        for i, ((x, y), place) in enumerate(zip(origins, np.rint(places).astype(int))):
+            tile = right[y : y + size, x : x + size]
+            x0, y0 = np.maximum(place - reach, 0)
+            x1, y1 = np.maximum(place + reach + size, 0)
+            window = left[y0:y1, x0:x1]
+            if min(window.shape) < size:
+                continue
+            fit = cv2.matchTemplate(window, tile, cv2.TM_CCOEFF_NORMED)
+            column, row = (x0, y0) - (place - reach)
+            self._responses[i, row : row + fit.shape[0], column : column + fit.shape[1]] = fit
+            seen = cv2.integral(left_valid[y0:y1, x0:x1])
+            seen = seen[size:, size:] - seen[:-size, size:] - seen[size:, :-size] + seen[:-size, :-size]
+            self._known[i, row : row + fit.shape[0], column : column + fit.shape[1]] = seen >= size * size
+            self._weight[i] = cv2.meanStdDev(tile)[1][0, 0] ** 2
+        rays = surface.rays(*centers.T)
+        solid = (rays[:, [0, 2]] ** 2).sum(axis=1) / (rays**2).sum(axis=1)
+        self._weight /= max(self._weight.sum(), 1e-6)
+        self._responses *= self._known
+        self._known = np.stack([
+            cv2.erode(k.astype(np.uint8), np.ones((3, 3), np.uint8), borderType=cv2.BORDER_CONSTANT, borderValue=0) for k in self._known
+        ]) > 0
+        known = np.log1p(-(_SUREST * np.maximum(self._responses, 0)) ** 2)
+        self._likelihood = known * (-0.5 * size * size / _GRAIN_PX * solid[:, None, None])
+        blur = lambda r: cv2.blur(r, (3, 3))
+        self._wide = np.stack([blur(r) for r in self._likelihood])
+
+    def search(self):
+        return max(
+            (self.search_shift(np.array(tilt)) for tilt in product(_TILTS_RAD, repeat=2)),
+            key=self.likelihood,
+        )
+
+    def search_shift(self, tilt):
+        """Best shift with this tilt."""
+        move = self._jacobian[:, :, 2:] @ tilt - self._rounding
+        column, row = np.rint(move).astype(int).T
+        r = self._reach
+        total = np.zeros((2 * r + 1, 2 * r + 1), np.float32)
+        for response, dx, dy in zip(self._wide, column, row):
+            a0, a1 = max(0, -dy), min(2 * r + 1, 2 * r + 1 - dy)
+            b0, b1 = max(0, -dx), min(2 * r + 1, 2 * r + 1 - dx)
+            if a1 > a0 and b1 > b0:
+                total[a0:a1, b0:b1] += response[a0 + dy : a1 + dy, b0 + dx : b1 + dx]
+        y, x = np.unravel_index(np.argmax(total), total.shape)
+        return np.array([x - r, y - r, *tilt], float)
+
+    def _spots(self, step):
+        """Nearest pixels (n, 2) of the responses for a step, inside their rims; what is left."""
+        move = self._jacobian @ step - self._rounding + self._reach
+        spot = np.clip(np.rint(move), 1, 2 * self._reach - 1).astype(int)
+        return spot, move - spot
+
+    def _peaks(self, step, within):
+        spot, rest = self._spots(step)
+        if not within:
+            return spot, rest
+        span = np.arange(-within, within + 1)
+        last = 2 * self._reach - 1
+        rows = np.clip(spot[:, 1, None, None] + span[:, None], 1, last)
+        columns = np.clip(spot[:, 0, None, None] + span, 1, last)
+        i = np.arange(len(spot))
+        near = self._likelihood[i[:, None, None], rows, columns].reshape(len(spot), -1)
+        y, x = np.unravel_index(near.argmax(axis=1), (len(span), len(span)))
+        peak = np.stack([columns[i, 0, x], rows[i, y, 0]], axis=-1)
+        return peak, rest + spot - peak
+
+    def climb(self, step, start, usual, tilt):
+        deviation = np.array([np.inf, _LIKELY_RISE_RAD * self._scale, *([_LIKELY_TILT_RAD if tilt else 1e-9] * 2)])
+        prior = np.diag(deviation ** -2.0)
+        mean = np.array([0, usual.y_px - start.y_px, usual.pitch_rad - start.pitch_rad, usual.roll_rad - start.roll_rad])
+        for within in _WITHIN:
+            slope, curvature = self._shape(step, within)
+            J = self._jacobian
+            H = np.einsum('nki,nkl,nlj->ij', J, curvature, J) + prior
+            g = np.einsum('nki,nk->i', J, slope) + prior @ (mean - step)
+            move = np.linalg.lstsq(H, g, rcond=None)[0]
+            step = step + move
+        return step
+
+    def _shape(self, step, within):
+        spot, rest = self._peaks(step, within)
+        slope, curvature = self._quadratic(self._likelihood, spot)
+        known = self._known[np.arange(len(spot)), spot[:, 1], spot[:, 0]]
+        slope, curvature = slope * known[:, None], curvature * known[:, None, None]
+        return slope - np.einsum('nij,nj->ni', curvature, rest), curvature
+
+    @staticmethod
+    def _quadratic(maps, spot):
+        i = np.arange(len(spot))[:, None, None]
+        n = maps[i, spot[:, 1, None, None] + np.arange(-1, 2)[:, None], spot[:, 0, None, None] + np.arange(-1, 2)]
+        slope = np.stack([n[:, 1, 2] - n[:, 1, 0], n[:, 2, 1] - n[:, 0, 1]], axis=-1) / 2
+        xx, yy = n[:, 1, 0] + n[:, 1, 2] - 2 * n[:, 1, 1], n[:, 0, 1] + n[:, 2, 1] - 2 * n[:, 1, 1]
+        xy = (n[:, 0, 0] + n[:, 2, 2] - n[:, 0, 2] - n[:, 2, 0]) / 4
+        hessian = -np.stack([np.stack([xx, xy], -1), np.stack([xy, yy], -1)], -1)
+        values, vectors = np.linalg.eigh(hessian)
+        return slope, np.einsum('nij,nj,nkj->nik', vectors, np.maximum(values, 0), vectors)
+
+    def likelihood(self, step):
+        spot, _ = self._spots(step)
+        return self._wide[np.arange(len(spot)), spot[:, 1], spot[:, 0]].sum()
+
+    def agreement(self, step):
+        spot, rest = self._spots(step)
+        slope, curvature = self._quadratic(self._responses, spot)
+        rest = np.clip(rest, -0.5, 0.5)
+        here = self._responses[np.arange(len(spot)), spot[:, 1], spot[:, 0]]
+        here = here + (slope * rest).sum(1) - 0.5 * np.einsum('ni,nij,nj->n', rest, curvature, rest)
+        known = self._known[np.arange(len(spot)), spot[:, 1], spot[:, 0]]
+        return float(self._weight[known] @ here[known] / max(self._weight[known].sum(), 1e-3))
+
+
+def _tiles(left_valid, right_valid, pose, size, inset) -> np.ndarray:
     """Upper left corners (n, 2) of tiles of the right picture that both pictures show."""
     x, y = round(pose.x_px), round(pose.y_px)
     (left_height, left_width), (height, width) = left_valid.shape, right_valid.shape
-    x0, x1 = max(0, -x), min(width, left_width - x)
+    x0, x1 = max(0, -x) + inset, min(width, left_width - x) - inset
     y0, y1 = max(0, -y), min(height, left_height - y)
     across, down = (min(most, (b - a) // size) for most, a, b in (
         (_COLUMNS, x0, x1), (_ROWS, y0, y1),
@@ -137,92 +242,6 @@ def _tiles(left_valid, right_valid, pose, size) -> np.ndarray:
     )
     row, column = np.nonzero(seen >= _SEEN_SHARE * size * size)
     return np.stack([columns[column] + x0, rows[row, 0] + y0], axis=-1)
-
-
-@dataclass(frozen=True)
-class _Tile:
-    """A tile of the right picture, looked for in the left one."""
-
-    origin: np.ndarray
-    shift: np.ndarray
-    """From where it was expected to where it was found, px."""
-    certainty: np.ndarray
-    """(2, 2) inverse covariance of `shift`, 1/px^2."""
-    weight: float
-    responses: np.ndarray
-    corner: tuple[int, int]
-    """Place in the left picture that the first of `responses` is for."""
-
-    @classmethod
-    def find(cls, left, right, origin, place, size, reach):
-        x, y = origin
-        left_x, left_y = (max(0, round(float(p)) - reach) for p in place)
-        right_x, right_y = (round(float(p)) + reach + size for p in place)
-        window = left[left_y : max(right_y, 0), left_x : max(right_x, 0)]
-        if min(window.shape) < size + 2:
-            return None
-        tile = right[y : y + size, x : x + size]
-        responses = cv2.matchTemplate(window, tile, cv2.TM_CCOEFF_NORMED)
-        _, best, _, (peak_x, peak_y) = cv2.minMaxLoc(responses)
-        offset, curvature = _peak(responses, peak_x, peak_y)
-        found = np.array([left_x + peak_x, left_y + peak_y]) + offset
-        trust = max(best - _WORTHLESS, 0.0) ** 2 * _CERTAINTY
-        weight = float(cv2.meanStdDev(tile)[1][0, 0] ** 2)
-        return cls(origin, found - place, curvature * trust, weight, responses, (left_x, left_y))
-
-    def response_near(self, place) -> float:
-        """Correlation at a place of the left picture, to the nearest pixel or its neighbours."""
-        x, y = (round(float(p)) - c for p, c in zip(place, self.corner))
-        if x < -1 or y < -1:
-            return 0.0
-        near = self.responses[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2]
-        return float(near.max()) if near.size else 0.0
-
-
-def _peak(responses, x, y):
-    """Sub-pixel place (2,) of a peak against its pixel, and the curvature (2, 2) there."""
-    height, width = responses.shape
-    if not (0 < x < width - 1 and 0 < y < height - 1):
-        return np.zeros(2), np.zeros((2, 2))
-    n = responses[y - 1 : y + 2, x - 1 : x + 2].astype(float)
-    slope = np.array([n[1, 2] - n[1, 0], n[2, 1] - n[0, 1]]) / 2
-    xx, yy = n[1, 0] + n[1, 2] - 2 * n[1, 1], n[0, 1] + n[2, 1] - 2 * n[1, 1]
-    xy = (n[0, 0] + n[2, 2] - n[0, 2] - n[2, 0]) / 4
-    values, vectors = np.linalg.eigh(-np.array([[xx, xy], [xy, yy]]))
-    offset = np.clip(slope / np.maximum([-xx, -yy], 1e-3), -0.5, 0.5)
-    return offset, vectors * np.maximum(values, 0) @ vectors.T
-
-
-def _fit(tiles, surface, start, level_y_px, search_rad, margin, tilt) -> Pose:
-    """Find the pose that most tiles agree on: iterated least squares, outliers weighed down.
-
-    What the tiles leave open is decided by how mounts usually are; tiles count by the solid angle
-    that they cover, so that the stretched rows far above and below the horizon do not win.
-    """
-    centers = np.array([tile.origin for tile in tiles]) + margin
-    shifts = np.array([tile.shift for tile in tiles])
-    rays = surface.rays(*centers.T)
-    solid = (rays[:, [0, 2]] ** 2).sum(axis=1) / (rays**2).sum(axis=1)
-    certainty = np.array([tile.certainty for tile in tiles]) * solid[:, None, None]
-    jacobian = _jacobian(surface, start, centers)
-    scale = surface.focal_px
-    deviation = np.array([
-        inf, _LIKELY_RISE_RAD * scale, *([_LIKELY_TILT_RAD if tilt else 1e-9] * 2),
-    ])
-    prior = np.diag(deviation**-2.0)
-    usual = np.array([0.0, level_y_px - start.y_px, -start.pitch_rad, -start.roll_rad])
-    step = np.array([*np.median(shifts, axis=0), 0.0, 0.0])
-    for spread in np.geomspace(search_rad / 4, search_rad / 10, _ROUNDS) * scale:
-        misfit = shifts - jacobian @ step
-        robust = (1 + (misfit**2).sum(axis=1) / spread**2) ** -2
-        weight = certainty * robust[:, None, None]
-        normal = np.einsum('nki,nkl,nlj->ij', jacobian, weight, jacobian) + prior
-        right = np.einsum('nki,nkl,nl->i', jacobian, weight, shifts) + prior @ usual
-        step = np.linalg.lstsq(normal, right, rcond=None)[0]
-    return Pose(
-        start.x_px + step[0], start.y_px + step[1],
-        start.pitch_rad + step[2], start.roll_rad + step[3],
-    )
 
 
 def _jacobian(surface, pose, points, by=1e-3):

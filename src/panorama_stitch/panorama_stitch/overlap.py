@@ -19,8 +19,9 @@ from panorama_stitch import paper
 from panorama_stitch.alignment import Alignment, Pose, align
 from panorama_stitch.correlation import Landscape, correlate
 from panorama_stitch.particles import Particle, facing_halves
-from panorama_stitch.structure import structure
+from panorama_stitch.structure import plain, structure
 
+FINE = True
 METHODS = ('particles', 'correlation', 'paper')
 
 _COARSE_PX_PER_DEG, _MIDDLE_PX_PER_DEG, _FINE_PX_PER_DEG = 1.0, 2.0, 4.0
@@ -251,8 +252,8 @@ class _Measurement:
         if best.agreement < self._settings.min_confidence:
             return self._side_by_side(method, best.agreement, 'no common scene')
         fine = self._step(_FINE_PX_PER_DEG)
-        views = structure(self._left, fine), structure(self._right, fine)
-        pose = self._align(*views, best.pose, fine, 0.8).pose
+        views = plain(self._left, fine), plain(self._right, fine)
+        pose = self._align(*views, best.pose, fine, 0.8).pose if FINE else best.pose
         x = pose.x_px + self._left_start
         return Overlap(
             method=method, found=True, offset_x_px=x, offset_y_px=pose.y_px,
@@ -272,7 +273,7 @@ class _Measurement:
         x = range(narrowest - right.detail.shape[1], left.detail.shape[1] - narrowest + 1)
         return correlate(left, right, x, y, min_pixels=narrowest * left.detail.shape[0] // 4)
 
-    def _align(self, left, right, start: Pose, step, search_deg) -> Alignment:
+    def _align(self, left, right, start: Pose, step, search_deg, usual=None) -> Alignment:
         height, width = right.detail.shape
         s = self._surfaces[1]
         surface = replace(
@@ -281,7 +282,7 @@ class _Measurement:
             center_y_px=(s.center_y_px + 0.5) / step - 0.5,
         )
         result = align(
-            left, right, surface, start.scaled(1 / step), self._level_y / step,
+            left, right, surface, start.scaled(1 / step), Pose(0.0, self._level_y / step) if usual is None else usual.scaled(1 / step),
             radians(search_deg), self._settings.correct_tilt,
         )
         return replace(result, pose=result.pose.scaled(step))

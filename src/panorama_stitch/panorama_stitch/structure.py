@@ -50,6 +50,13 @@ def structure(picture: np.ndarray, step: int) -> Structure:
     return Structure(detail * valid / np.sqrt(contrast + _NOISE_LEVEL**2), valid)
 
 
+def plain(picture: np.ndarray, step: int) -> Structure:
+    """Give a picture itself, reduced and a little smoothed."""
+    picture, valid = _reduce(picture, step)
+    weight = valid.astype(np.float32)
+    return Structure(_average(picture * weight, weight, cv2.GaussianBlur, (0, 0), 1.0) * weight, valid)
+
+
 def _reduce(picture, step):
     """Reduce a picture to float32, and tell which pixels are made of valid ones only."""
     height, width = (side // step for side in picture.shape)
