@@ -45,5 +45,5 @@ def calibration_path(url: str) -> Path | None:
         return Path(get_package_share_directory(package), path)
     except (LookupError, ValueError, OSError) as error:
         raise CameraFileError(
-            f"camera_info_url '{url}': there is no package '{package}'"
+            f"camera_info_url '{url}' names the package '{package}', which is not installed"
         ) from error

@@ -28,9 +28,9 @@ class CaptureNode(Node):
 
     def __init__(self, **kwargs):
         super().__init__('capture', **kwargs)
-        self._parameters = Parameters(self, CaptureSettings)
+        self._declared = Parameters(self, CaptureSettings)
         name = self.get_namespace().rsplit('/', 1)[-1] or 'camera'
-        self._settings = self._parameters.settings.named(name)
+        self._settings = self._declared.settings.named(name)
         self._calibration_path = calibration_path(self._settings.camera_info_url)
         self._image = ImagePublisher(self, 'image_raw')
         self._camera_info = self.create_publisher(CameraInfo, 'camera_info', IMAGE)
@@ -41,7 +41,7 @@ class CaptureNode(Node):
         self._camera = self._calibration()
         self.create_service(SetCameraInfo, 'set_camera_info', self._set_camera_info)
         self._diagnostics = Diagnostics(self, self._report)
-        if self._grabber.reason:
+        if self._grabber.attempts:
             self._tell(self._grabber.reason)
         self._grabber.start()
 
@@ -73,9 +73,7 @@ class CaptureNode(Node):
                 self._buffer = ImageBuffer(width, height, encoding)
             np.copyto(self._buffer.array, image)
             self._buffer.message.header = header
-            self._image.publish(
-                self._buffer.message, image, self._parameters.settings.jpeg_quality
-            )
+            self._image.publish(self._buffer.message, image, self._declared.settings.jpeg_quality)
         self._info.header = header
         self._camera_info.publish(self._info)
 

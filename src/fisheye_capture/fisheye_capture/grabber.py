@@ -27,7 +27,7 @@ class Grabber:
     reason
         Why there are no frames now; '' while they come.
     attempts
-        Vain attempts to reopen the source since it was lost.
+        Vain attempts to open the source since the last frame.
     frames
         Frames handed over so far.
     """
@@ -67,7 +67,7 @@ class Grabber:
         try:
             self._source = open_source(settings)
         except SourceLostError as error:
-            self.reason = str(error)
+            self.reason, self.attempts = str(error), 1
         self.camera = self._source.camera if self._source else None
 
     @property
@@ -109,12 +109,12 @@ class Grabber:
                 self._source = self._source or open_source(self._settings)
                 self._read(self._source)
             except SourceEndedError as error:
+                wait_s = None
                 self._change(str(error))
-                self._stopping.wait()
             except SourceError as error:
                 came = self.frames > frames
-                self.attempts = 0 if came else self.attempts + 1
-                wait_s = _FIRST_WAIT_S if came else min(2 * wait_s, self._settings.reconnect_max_s)
+                self.attempts += not came
+                wait_s = min(_FIRST_WAIT_S if came else 2 * wait_s, self._settings.reconnect_max_s)
                 self._change(str(error))
             finally:
                 self._release()
@@ -125,6 +125,7 @@ class Grabber:
             frame = source.read()
             self.frames += 1
             self._arrivals_s.append(time.monotonic())
+            self.attempts = 0
             self._change('')
             self._on_frame(frame)
 

@@ -73,7 +73,7 @@ class DeviceSource(LiveSource):
         source = settings.source
         if len(settings.pixel_format) not in (0, 4):
             raise SourceError(
-                f"pixel_format is '{settings.pixel_format}'; expected four letters, as MJPG or YUYV"
+                f"pixel_format is '{settings.pixel_format}'; expected four letters, as MJPG"
             )
         path = f'/dev/video{source}' if source.isdecimal() else source
         if not os.path.exists(path):
@@ -82,9 +82,7 @@ class DeviceSource(LiveSource):
             raise SourceLostError(f'{path} may not be opened; is the user in the group video?')
         capture = cv2.VideoCapture(path, cv2.CAP_V4L2)
         if not capture.isOpened():
-            raise SourceLostError(
-                f'{path} cannot be opened; is it a camera that nothing else uses?'
-            )
+            raise SourceLostError(f'{path} cannot be opened; is it a camera, and free?')
         super().__init__(path, capture, settings.encoding)
         self._interrupted = False
         self.note = self._set_up(settings)
@@ -113,11 +111,10 @@ class DeviceSource(LiveSource):
             for name, (_, value) in asked.items()
             if value and abs(given[name] - value) > 0.5
         ]
-        given_format = (
-            int(capture.get(cv2.CAP_PROP_FOURCC)).to_bytes(4, 'little').decode('latin-1')
-        )
-        if pixel_format and given_format != pixel_format:
-            differing.append(f'{given_format} instead of {pixel_format}')
+        code = max(0, int(capture.get(cv2.CAP_PROP_FOURCC)))
+        fourcc = code.to_bytes(4, 'little').decode('latin-1')
+        if pixel_format and fourcc != pixel_format:
+            differing.append(f'{fourcc} instead of {pixel_format}')
         return f'{self._name} gives ' + ', '.join(differing) if differing else ''
 
     def _grab(self):

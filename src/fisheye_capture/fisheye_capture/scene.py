@@ -5,6 +5,7 @@ processes they are made.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -95,8 +96,12 @@ def _rays(source: Lens | Surface, rows: slice) -> np.ndarray:
     return np.where(seen[..., None], rays, 0.0)
 
 
+@lru_cache(maxsize=1)
 def _soft_town(seed: int, px_per_rad: float) -> tuple[Surface, np.ndarray]:
-    """Paint the town for a view's resolution and blur away what the view cannot resolve."""
+    """Paint the town for a view's resolution and blur away what the view cannot resolve.
+
+    The last one is kept: the cameras of a rig mostly need the same.
+    """
     width = min(2 * round(np.pi * px_per_rad * _OVERSAMPLING), _WIDEST_CANVAS_PX)
     canvas = paint_town(width, seed)
     around = canvas.surface

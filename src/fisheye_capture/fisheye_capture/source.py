@@ -11,7 +11,7 @@ from fisheye_geometry.errors import SourceError
 
 
 class SourceLostError(SourceError):
-    """A camera that is not there, or not any more, and may come back."""
+    """A camera that is not there, or not any more; it may come."""
 
 
 class SourceEndedError(SourceError):

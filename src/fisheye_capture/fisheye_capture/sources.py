@@ -1,5 +1,6 @@
 """Which kind of source a name means."""
 
+import os
 import re
 from glob import glob
 from pathlib import Path
@@ -44,22 +45,26 @@ def open_source(settings: CaptureSettings) -> Source:
             f"source '{source}' has the scheme '{scheme}'; expected one of "
             f'{", ".join(_STREAMS)} or file'
         )
-    return _open_files(settings, Path(rest if mark else source).expanduser())
+    return _open_files(settings, os.path.expanduser(rest if mark else source))
 
 
-def _open_files(settings: CaptureSettings, path: Path) -> Source:
-    if path.is_file():
-        if path.suffix.lower() in PICTURE_SUFFIXES:
-            return PictureSource(settings, path)
-        return SequenceSource(settings, video_pictures(path, settings.loop))
-    pattern = path / '*' if path.is_dir() else path
-    paths = [Path(name) for name in sorted(glob(str(pattern), recursive=True))]
-    pictures = [entry for entry in paths if entry.suffix.lower() in PICTURE_SUFFIXES]
+def _open_files(settings: CaptureSettings, name: str) -> Source:
+    if os.path.isfile(name):
+        if _is_picture(name):
+            return PictureSource(settings, Path(name))
+        return SequenceSource(settings, video_pictures(Path(name), settings.loop))
+    pattern = os.path.join(name, '*') if os.path.isdir(name) else name
+    paths = sorted(glob(pattern, recursive=True))
+    pictures = [Path(path) for path in paths if _is_picture(path)]
     if pictures:
         return SequenceSource(settings, folder_pictures(pictures, settings.loop))
-    if path.is_dir() or paths:
-        raise SourceError(f'there is no picture in {path}')
+    if paths or os.path.isdir(name):
+        raise SourceError(f'there is no picture in {name}')
     raise SourceError(
         f"source '{settings.source}' is not there; expected synthetic, a device, a picture, a "
         'folder or glob of pictures, a video, or an http, rtsp or udp URL'
     )
+
+
+def _is_picture(name: str) -> bool:
+    return os.path.splitext(name)[1].lower() in PICTURE_SUFFIXES

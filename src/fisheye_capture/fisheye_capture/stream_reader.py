@@ -35,7 +35,7 @@ def open_stream(url: str, encoding: str, frame_rate_hz: float) -> LiveSource:
     parameters = [number for prop, s in limits.items() for number in (prop, round(s * 1000))]
     capture = cv2.VideoCapture(url, cv2.CAP_FFMPEG, parameters)
     if not capture.isOpened():
-        raise SourceLostError(f'{name} cannot be opened; is the camera on and the address right?')
+        raise SourceLostError(f'{name} cannot be opened; is it on, and the address right?')
     return LiveSource(name, capture, encoding)
 
 

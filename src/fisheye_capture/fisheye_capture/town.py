@@ -90,7 +90,7 @@ def _paint_ground(canvas, random):
             distance = np.hypot(i, j)
             if 0 < distance < reach:
                 fade = (distance / reach) ** 2
-                x, z = (corners + (i, j)).T
+                x, z = (corners + np.array([i, j])).T
                 tile = np.stack([x, np.full(4, EYE_HEIGHT_M), z], axis=-1)
                 canvas.polygon(tile, color * (1 - fade) + _FAR_GROUND * fade)
 

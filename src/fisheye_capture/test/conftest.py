@@ -1,31 +1,51 @@
 """What the tests of this package share."""
 
 import time
-from collections.abc import Callable
 from dataclasses import replace
 
+import cv2
+import numpy as np
 import pytest
 
 from fisheye_capture.settings import CaptureSettings
 
 PATIENCE_S = 20.0
-"""Long enough for a busy machine; a test that works does not wait for it."""
+"""Long enough for a busy machine; nothing waits for it that works."""
 
 
-def wait_until(condition: Callable[[], object], what: str) -> None:
-    """Wait until a condition holds; fail when it takes too long."""
-    deadline_s = time.monotonic() + PATIENCE_S
-    while not condition():
-        if time.monotonic() > deadline_s:
-            pytest.fail(f'{what} did not happen within {PATIENCE_S:g} s')
-        time.sleep(0.005)
+@pytest.fixture
+def wait_until():
+    """Wait until a condition holds; fail when that takes too long."""
+
+    def wait(condition, what):
+        deadline_s = time.monotonic() + PATIENCE_S
+        while not condition():
+            if time.monotonic() > deadline_s:
+                pytest.fail(f'{what} did not come about within {PATIENCE_S:g} s')
+            time.sleep(0.005)
+
+    return wait
 
 
 @pytest.fixture
 def settings():
-    """Make settings of a camera called left."""
+    """Make the settings of a camera called left."""
 
-    def make(**changes) -> CaptureSettings:
-        return replace(CaptureSettings(), **changes).named('left')
+    def make(source='synthetic', **changes):
+        fast = {'frame_rate_hz': 200.0, 'source': str(source)}
+        return replace(CaptureSettings(), **{**fast, **changes}).named('left')
 
     return make
+
+
+@pytest.fixture
+def write_picture(tmp_path):
+    """Write a plain picture of a level of grey; give its path."""
+
+    def write(name, level, width=32, height=24):
+        path = tmp_path / name
+        path.parent.mkdir(exist_ok=True)
+        cv2.imwrite(str(path), np.full((height, width, 3), level, np.uint8))
+        return path
+
+    return write

@@ -1,0 +1,50 @@
+"""Where a calibration is: paths, file:// and package://."""
+
+from pathlib import Path
+
+import pytest
+
+from fisheye_capture import calibration_url
+from fisheye_capture.calibration_url import calibration_of, calibration_path
+from fisheye_capture.synthetic import synthetic_lens
+from fisheye_geometry.camera_file import Camera, write_camera
+from fisheye_geometry.errors import CameraFileError
+
+
+@pytest.mark.parametrize(
+    ('url', 'path'),
+    [
+        ('calibration/left.yaml', Path('calibration/left.yaml')),
+        ('/etc/left.yaml', Path('/etc/left.yaml')),
+        ('~/left.yaml', Path.home() / 'left.yaml'),
+        ('file:///etc/my%20left.yaml', Path('/etc/my left.yaml')),
+        ('package://rig/config/left.yaml', Path('/share/rig/config/left.yaml')),
+    ],
+)
+def test_urls_name_files(monkeypatch, url, path):
+    monkeypatch.setattr(
+        calibration_url, 'get_package_share_directory', lambda name: f'/share/{name}'
+    )
+    assert calibration_path(url) == path
+
+
+def test_an_empty_url_names_nothing():
+    assert calibration_path('') is None
+    assert calibration_of('') is None
+
+
+def test_the_camera_of_a_file(tmp_path):
+    camera = Camera('left', synthetic_lens(640, 480, 3.0))
+    write_camera(tmp_path / 'left.yaml', camera)
+    assert calibration_of(f'file://{tmp_path}/left.yaml').lens == camera.lens
+
+
+@pytest.mark.parametrize('package', ['not_installed_anywhere', '..', ''])
+def test_a_package_that_is_not_there_is_named(package):
+    with pytest.raises(CameraFileError, match=f"names the package '{package}'"):
+        calibration_path(f'package://{package}/left.yaml')
+
+
+def test_another_scheme_is_refused():
+    with pytest.raises(CameraFileError, match="scheme 'http'; expected a path"):
+        calibration_path('http://camera/left.yaml')

@@ -1,0 +1,201 @@
+"""The capture node in this process, heard by a node beside it."""
+
+import numpy as np
+import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from sensor_msgs.srv import SetCameraInfo
+from std_msgs.msg import Header
+
+from fisheye_bridge.camera_info import camera_info_of, camera_of
+from fisheye_bridge.images import from_jpeg, to_array
+from fisheye_bridge.qos import IMAGE
+from fisheye_capture.capture_node import CaptureNode
+from fisheye_capture.synthetic import synthetic_lens
+from fisheye_geometry.camera_file import Camera, read_camera, write_camera
+from fisheye_geometry.errors import CameraFileError, FisheyeError, SettingError, SourceError
+
+LENS = synthetic_lens(640, 480, np.radians(170))
+SMALL = synthetic_lens(32, 24, np.radians(170))
+
+
+class Ear(Node):
+    """Keeps the last message of each topic of the camera called left."""
+
+    def __init__(self, context):
+        super().__init__('ear', context=context)
+        self.heard = {}
+        for kind, topic in (
+            (Image, '/left/image_raw'),
+            (CameraInfo, '/left/camera_info'),
+            (DiagnosticArray, '/diagnostics'),
+        ):
+            self.listen(kind, topic)
+
+    def listen(self, kind, topic):
+        self.create_subscription(
+            kind, topic, lambda message: self.heard.update({topic: message}), IMAGE
+        )
+
+
+@pytest.fixture
+def ros(wait_until):
+    """Give `start`, which builds the node, and `hear`, which spins until a topic was heard."""
+
+    class Ros:
+        def __init__(self):
+            self.context = rclpy.Context()
+            rclpy.init(context=self.context)
+            self.executor = SingleThreadedExecutor(context=self.context)
+            self.ear = Ear(self.context)
+            self.executor.add_node(self.ear)
+            self.nodes = [self.ear]
+
+        def start(self, namespace='/left', **parameters):
+            node = CaptureNode(
+                context=self.context,
+                namespace=namespace,
+                parameter_overrides=[
+                    Parameter(name, value=value) for name, value in parameters.items()
+                ],
+            )
+            self.nodes.append(node)
+            self.executor.add_node(node)
+            return node
+
+        def spin_until(self, condition, what):
+            def spun():
+                self.executor.spin_once(timeout_sec=0.05)
+                return condition()
+
+            wait_until(spun, what)
+
+        def hear(self, topic):
+            self.ear.heard.pop(topic, None)
+            self.spin_until(lambda: topic in self.ear.heard, topic)
+            return self.ear.heard[topic]
+
+        def call(self, camera_info):
+            client = self.ear.create_client(SetCameraInfo, '/left/set_camera_info')
+            future = client.call_async(SetCameraInfo.Request(camera_info=camera_info))
+            self.spin_until(future.done, 'the answer')
+            return future.result()
+
+    ros = Ros()
+    yield ros
+    for node in reversed(ros.nodes):
+        node.destroy_node()
+    rclpy.shutdown(context=ros.context)
+
+
+def test_a_camera_needs_nothing_but_its_namespace(ros):
+    ros.start()
+    image, info = ros.hear('/left/image_raw'), ros.hear('/left/camera_info')
+    assert (image.header.frame_id, image.encoding) == ('left_optical_frame', 'bgr8')
+    assert to_array(image)[0].shape == (480, 640, 3)
+    lens = camera_of(info).lens
+    assert (lens.width, lens.height, lens.model) == (640, 480, 'equidistant')
+    assert lens.distortion == LENS.distortion
+
+
+def test_every_picture_has_a_camera_info_of_its_stamp(ros):
+    ros.start(frame_rate_hz=10)
+    ros.hear('/left/image_raw')
+    info, image = ros.hear('/left/camera_info'), ros.ear.heard['/left/image_raw']
+    assert info.header == image.header
+
+
+def test_the_picture_is_the_one_of_the_file_also_as_jpeg(ros, write_picture):
+    ros.start(source=str(write_picture('one.png', 7)), encoding='mono8', frame_rate_hz=30.0)
+    topic = '/left/image_raw/compressed'
+    ros.ear.listen(CompressedImage, topic)
+    image, encoding = to_array(ros.hear('/left/image_raw'))
+    assert encoding == 'mono8'
+    assert (image == 7).all()
+    packed = ros.hear(topic)
+    assert packed.format == 'mono8; jpeg compressed '
+    assert from_jpeg(packed)[0].shape == (24, 32)
+
+
+def test_without_a_calibration_k_is_zero_and_it_is_said(ros, write_picture):
+    ros.start(source=str(write_picture('one.png', 7)))
+    info = ros.hear('/left/camera_info')
+    assert (info.width, info.height, any(info.k)) == (32, 24, False)
+    status = ros.hear('/diagnostics').status[0]
+    assert (status.level, status.message) == (
+        DiagnosticStatus.WARN,
+        'the camera is not calibrated',
+    )
+
+
+def test_a_calibration_file_is_published(ros, write_picture, tmp_path):
+    write_camera(tmp_path / 'left.yaml', Camera('left', SMALL))
+    ros.start(
+        source=str(write_picture('one.png', 7)), camera_info_url=f'file://{tmp_path}/left.yaml'
+    )
+    assert camera_of(ros.hear('/left/camera_info')).lens == SMALL
+
+
+def test_a_calibration_of_another_size_is_not_published(ros, write_picture, tmp_path):
+    write_camera(tmp_path / 'left.yaml', Camera('left', LENS))
+    ros.start(source=str(write_picture('one.png', 7)), camera_info_url=str(tmp_path / 'left.yaml'))
+    assert not any(ros.hear('/left/camera_info').k)
+    message = ros.hear('/diagnostics').status[0].message
+    assert message == 'the calibration is for 640x480 px; the pictures have 32x24 px'
+
+
+def test_set_camera_info_writes_the_file_and_is_used_at_once(ros, write_picture, tmp_path):
+    path = tmp_path / 'new' / 'left.yaml'
+    ros.start(source=str(write_picture('one.png', 7)), camera_info_url=str(path))
+    assert not any(ros.hear('/left/camera_info').k)
+    answer = ros.call(camera_info_of(Camera('left', SMALL), Header()))
+    assert answer.success
+    assert str(path) in answer.status_message
+    assert read_camera(path) == Camera('left', SMALL, projection=read_camera(path).projection)
+    ros.spin_until(lambda: any(ros.hear('/left/camera_info').k), 'the new calibration')
+
+
+def test_set_camera_info_is_refused_with_a_sentence(ros, write_picture, tmp_path):
+    ros.start(source=str(write_picture('one.png', 7)))
+    answer = ros.call(camera_info_of(Camera('left', SMALL), Header()))
+    assert (answer.success, answer.status_message) == (
+        False,
+        'camera_info_url is empty; expected the file to write',
+    )
+
+
+def test_nonsense_is_never_written(ros, write_picture, tmp_path):
+    path = tmp_path / 'left.yaml'
+    ros.start(source=str(write_picture('one.png', 7)), camera_info_url=str(path))
+    answer = ros.call(CameraInfo(width=32, height=24, distortion_model='equidistant'))
+    assert not answer.success
+    assert 'K is zero' in answer.status_message
+    assert not path.exists()
+
+
+def test_a_camera_that_is_not_there_is_an_error_in_the_diagnostics(ros):
+    ros.start(source=97, reconnect_max_s=0.1)
+    status = ros.hear('/diagnostics').status[0]
+    assert status.level == DiagnosticStatus.ERROR
+    assert 'there is no device /dev/video97 (attempts to reopen:' in status.message
+    assert '/left/image_raw' not in ros.ear.heard
+
+
+@pytest.mark.parametrize(
+    ('parameters', 'error', 'sentence'),
+    [
+        ({'source': 'nowhere.png'}, SourceError, "source 'nowhere.png' is not there"),
+        ({'frame_rate_hz': 0}, SettingError, 'frame_rate_hz'),
+        ({'encoding': 'yuv'}, SettingError, 'bgr8, mono8, rgb8'),
+        ({'camera_info_url': 'http://x/y.yaml'}, CameraFileError, "scheme 'http'"),
+        ({'camera_info_url': 'package://nowhere_/y.yaml'}, CameraFileError, 'not installed'),
+    ],
+)
+def test_what_can_never_work_is_refused_at_start(ros, parameters, error, sentence):
+    with pytest.raises(FisheyeError, match=sentence) as raised:
+        ros.start(**parameters)
+    assert raised.type is error

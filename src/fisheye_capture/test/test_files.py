@@ -1,0 +1,113 @@
+"""Pictures, folders and videos: held, in turn, looped; what cannot be read is named."""
+
+import cv2
+import numpy as np
+import pytest
+
+from fisheye_capture.source import SourceEndedError
+from fisheye_capture.sources import open_source
+from fisheye_geometry.errors import SourceError
+
+CODING_LOSS = 6
+"""Grey levels by which a video's coding may miss a plain picture."""
+
+
+def levels(source, count):
+    return [int(source.read().image[0, 0, 0]) for _ in range(count)]
+
+
+@pytest.fixture
+def video(tmp_path):
+    path = tmp_path / 'video.avi'
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*'MJPG'), 25, (32, 24))
+    for level in (50, 100, 150):
+        writer.write(np.full((24, 32, 3), level, np.uint8))
+    writer.release()
+    return path
+
+
+def test_a_picture_is_decoded_once_and_held(settings, write_picture):
+    source = open_source(settings(write_picture('one.png', 7)))
+    first, second = source.read(), source.read()
+    assert first.image is second.image
+    assert not first.image.flags.writeable
+    assert second.stamp_ns > first.stamp_ns
+    assert (first.image == 7).all()
+
+
+@pytest.mark.parametrize(
+    ('encoding', 'pixel'), [('bgr8', [10, 20, 30]), ('rgb8', [30, 20, 10]), ('mono8', 22)]
+)
+def test_pictures_come_in_the_encoding_asked_for(settings, tmp_path, encoding, pixel):
+    path = tmp_path / 'colour.png'
+    cv2.imwrite(str(path), np.full((4, 6, 3), (10, 20, 30), np.uint8))
+    image = open_source(settings(path, encoding=encoding)).read().image
+    np.testing.assert_array_equal(image[0, 0], pixel)
+
+
+def test_a_grey_picture_of_16_bit_becomes_8_bit(settings, tmp_path):
+    path = tmp_path / 'deep.png'
+    cv2.imwrite(str(path), np.full((4, 6), 200 * 256, np.uint16))
+    assert open_source(settings(path)).read().image[0, 0].tolist() == [200, 200, 200]
+
+
+def test_a_folder_is_shown_in_name_order_and_again(settings, write_picture, tmp_path):
+    for name, level in (('b.png', 2), ('a.png', 1), ('c.png', 3)):
+        write_picture(f'folder/{name}', level)
+    (tmp_path / 'folder' / 'notes.txt').write_text('no picture')
+    assert levels(open_source(settings(tmp_path / 'folder')), 4) == [1, 2, 3, 1]
+
+
+def test_a_glob_takes_what_matches(settings, write_picture, tmp_path):
+    for name, level in (('left_1.png', 1), ('right_1.png', 9), ('left_2.png', 2)):
+        write_picture(name, level)
+    assert levels(open_source(settings(tmp_path / 'left_*.png')), 3) == [1, 2, 1]
+
+
+def test_without_loop_the_end_is_the_end(settings, write_picture, tmp_path):
+    write_picture('folder/only.png', 1)
+    source = open_source(settings(tmp_path / 'folder', loop=False))
+    source.read()
+    with pytest.raises(SourceEndedError, match='last picture'):
+        source.read()
+
+
+def test_a_folder_of_different_sizes_names_the_first_that_differs(
+    settings, write_picture, tmp_path
+):
+    write_picture('folder/a.png', 1)
+    write_picture('folder/b.png', 1, width=40)
+    source = open_source(settings(tmp_path / 'folder'))
+    source.read()
+    with pytest.raises(SourceError, match=r'b\.png has 40x24 px.*have 32x24 px'):
+        source.read()
+
+
+def test_a_video_is_paced_and_looped(settings, video):
+    source = open_source(settings(video))
+    assert levels(source, 5) == pytest.approx([50, 100, 150, 50, 100], abs=CODING_LOSS)
+    assert source.read().stamp_ns % 5_000_000 == 0
+
+
+def test_a_video_without_loop_ends(settings, video):
+    source = open_source(settings(video, loop=False))
+    assert len(levels(source, 3)) == 3
+    with pytest.raises(SourceEndedError):
+        source.read()
+
+
+@pytest.mark.parametrize('name', ['broken.png', 'broken.mp4', 'text.txt'])
+def test_a_file_that_is_no_picture_is_named(settings, tmp_path, name):
+    path = tmp_path / name
+    path.write_bytes(b'this is not a picture')
+    with pytest.raises(SourceError, match=name):
+        open_source(settings(path))
+
+
+def test_an_unreadable_picture_in_a_folder_is_named(settings, write_picture, tmp_path):
+    write_picture('folder/a.png', 1)
+    (tmp_path / 'folder' / 'b.png').write_bytes(b'')
+    source = open_source(settings(tmp_path / 'folder'))
+    source.read()
+    with pytest.raises(SourceError, match=r'b\.png cannot be read'):
+        source.read()

@@ -1,0 +1,128 @@
+"""Grabbing: frames while there are any, and a lost camera that comes back."""
+
+import pytest
+from mjpeg_server import MjpegServer, jpeg
+
+from fisheye_capture import grabber as grabber_module
+from fisheye_capture.grabber import Grabber
+from fisheye_capture.source import Frame, Source, SourceEndedError, SourceLostError
+from fisheye_geometry.errors import SourceError
+
+
+@pytest.fixture
+def grab(settings):
+    """Start a grabber; gives it with the list that its frames are added to."""
+    grabbers = []
+
+    def start(source, **changes):
+        frames = []
+        grabber = Grabber(settings(source, **changes), frames.append)
+        grabbers.append(grabber)
+        grabber.start()
+        return grabber, frames
+
+    yield start
+    for grabber in grabbers:
+        grabber.stop()
+
+
+def test_it_hands_over_frames_and_knows_the_camera(grab, wait_until):
+    grabber, frames = grab('synthetic', frame_rate_hz=50.0)
+    wait_until(lambda: len(frames) > 10, 'frames')
+    assert grabber.camera.lens.width == 640
+    assert grabber.reason == ''
+    assert grabber.rate_hz == pytest.approx(50, rel=0.5)
+    grabber.stop()
+    assert len(frames) == grabber.frames
+
+
+@pytest.mark.parametrize('source', ['nowhere.png', 'ftp://camera'])
+def test_what_can_never_work_fails_at_start(settings, source):
+    with pytest.raises(SourceError):
+        Grabber(settings(source), print)
+
+
+def test_a_camera_that_is_not_there_yet_is_waited_for(grab, wait_until):
+    grabber, frames = grab('97', reconnect_max_s=0.1)
+    wait_until(lambda: grabber.attempts > 2, 'further attempts')
+    assert grabber.reason == 'there is no device /dev/video97'
+    assert not frames
+
+
+def test_an_http_camera_is_lost_and_comes_back(grab, wait_until):
+    camera = MjpegServer(jpeg(90))
+    grabber, frames = grab(camera.url, reconnect_max_s=0.3)
+    wait_until(lambda: frames, 'the first frames')
+    camera.stop()
+    wait_until(lambda: grabber.reason, 'the loss')
+    wait_until(lambda: grabber.attempts > 1, 'vain attempts')
+    assert 'cannot be opened' in grabber.reason
+    count = len(frames)
+    camera = MjpegServer(jpeg(180), port=camera.port)
+    wait_until(lambda: len(frames) > count, 'new frames')
+    assert frames[count].image.mean() > 170
+    assert (grabber.reason, grabber.attempts) == ('', 0)
+    camera.stop()
+
+
+def test_garbage_from_a_camera_is_never_handed_over(grab, wait_until):
+    camera = MjpegServer(jpeg(90))
+    grabber, frames = grab(camera.url, reconnect_max_s=0.3)
+    wait_until(lambda: frames, 'the first frames')
+    camera.picture = bytes(range(256)) * 20
+    wait_until(lambda: grabber.reason, 'the loss')
+    camera.picture = jpeg(90)
+    wait_until(lambda: not grabber.reason, 'the return')
+    assert all(abs(frame.image.mean() - 90) < 4 for frame in frames)
+    camera.stop()
+
+
+class Prepared(Source):
+    """Gives prepared frames; raises prepared errors."""
+
+    def __init__(self, answers):
+        self._answers = answers
+        self.is_closed = False
+
+    def read(self):
+        answer = self._answers.pop(0)
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    def close(self):
+        self.is_closed = True
+
+
+def test_each_lost_source_is_closed_before_it_is_opened_again(grab, wait_until, monkeypatch):
+    opened = [
+        Prepared([Frame(1, None), SourceLostError('unplugged')]),
+        Prepared([Frame(2, None), SourceEndedError('over')]),
+    ]
+    waiting = list(opened)
+    monkeypatch.setattr(grabber_module, 'open_source', lambda settings: waiting.pop(0))
+    grabber, frames = grab('any')
+    wait_until(lambda: grabber.reason == 'over', 'the end')
+    assert [frame.stamp_ns for frame in frames] == [1, 2]
+    assert all(source.is_closed for source in opened)
+
+
+@pytest.mark.parametrize('source', ['97', 'http://127.0.0.1:1/', 'synthetic'])
+def test_it_stops_in_every_state(grab, source):
+    grabber, _ = grab(source, frame_rate_hz=0.1, reconnect_max_s=3600.0)
+    grabber.stop()
+    assert not grabber._thread.is_alive()
+
+
+def test_changes_are_told(settings, wait_until, monkeypatch):
+    waiting = [
+        Prepared([Frame(1, None), SourceLostError('unplugged')]),
+        Prepared([Frame(2, None), SourceEndedError('over')]),
+    ]
+    monkeypatch.setattr(grabber_module, 'open_source', lambda settings: waiting.pop(0))
+    told = []
+    grabber = Grabber(settings('any'), lambda frame: None, on_change=told.append)
+    grabber.start()
+    wait_until(lambda: 'over' in told, 'the end')
+    grabber.stop()
+    assert told == ['', 'unplugged', '', 'over']

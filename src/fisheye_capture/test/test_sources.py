@@ -1,0 +1,60 @@
+"""What a source's name means, and what is said of one that means nothing."""
+
+import pytest
+
+from fisheye_capture import sources
+from fisheye_capture.source import SourceLostError
+from fisheye_capture.sources import open_source
+from fisheye_geometry.errors import SourceError
+
+
+def test_the_synthetic_camera_is_known_exactly(settings):
+    source = open_source(settings(synthetic_fov_deg=160.0))
+    camera, frame = source.camera, source.read()
+    assert camera.name == 'left'
+    assert frame.image.shape == (camera.lens.height, camera.lens.width, 3) == (480, 640, 3)
+
+
+def test_cameras_of_one_rate_share_a_grid_of_times(settings, write_picture):
+    period_ns = 5_000_000
+    for name in ('synthetic', write_picture('one.png', 7)):
+        source = open_source(settings(name, frame_rate_hz=200.0))
+        assert all(source.read().stamp_ns % period_ns == 0 for _ in range(5))
+
+
+@pytest.mark.parametrize('name', ['0', '12', '/dev/video3', '/dev/v4l/by-id/usb-left'])
+def test_devices(settings, monkeypatch, name):
+    monkeypatch.setattr(sources, 'DeviceSource', lambda settings: settings.source)
+    assert open_source(settings(name)) == name
+
+
+@pytest.mark.parametrize('scheme', ['http', 'https', 'rtsp', 'rtsps', 'udp'])
+def test_streams(settings, monkeypatch, scheme):
+    monkeypatch.setattr(sources, 'StreamSource', lambda settings: settings.source)
+    assert open_source(settings(f'{scheme}://camera/stream')) == f'{scheme}://camera/stream'
+
+
+def test_a_file_url_is_a_file(settings, write_picture):
+    path = write_picture('one.png', 7)
+    assert (open_source(settings(f'file://{path}')).read().image == 7).all()
+
+
+def test_an_unknown_scheme_is_refused_with_those_that_are_known(settings):
+    with pytest.raises(SourceError, match=r"scheme 'ftp'; expected one of http, .*udp or file"):
+        open_source(settings('ftp://camera'))
+
+
+@pytest.mark.parametrize('name', ['nowhere.png', 'nowhere/*.png', '', '~no_such_user/x'])
+def test_what_is_not_there_is_named(settings, name):
+    with pytest.raises(SourceError, match='is not there; expected synthetic, a device'):
+        open_source(settings(name))
+
+
+def test_an_empty_folder_is_named(settings, tmp_path):
+    with pytest.raises(SourceError, match=f'no picture in {tmp_path}'):
+        open_source(settings(tmp_path))
+
+
+def test_a_device_that_is_not_there_may_come(settings):
+    with pytest.raises(SourceLostError, match='there is no device /dev/video97'):
+        open_source(settings('97'))

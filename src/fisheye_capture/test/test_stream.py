@@ -1,0 +1,75 @@
+"""Network streams, from a real HTTP camera."""
+
+import time
+from threading import Thread
+
+import pytest
+from mjpeg_server import MjpegServer, jpeg
+
+from fisheye_capture.source import SourceLostError
+from fisheye_capture.stream import StreamSource
+
+CODING_LOSS = 4
+"""Grey levels by which JPEG may miss a plain picture."""
+
+
+@pytest.fixture
+def camera():
+    server = MjpegServer(jpeg(90))
+    yield server
+    server.stop()
+
+
+@pytest.fixture
+def open_stream(settings):
+    sources = []
+
+    def open_it(url, **changes):
+        sources.append(StreamSource(settings(url, **changes)))
+        return sources[-1]
+
+    yield open_it
+    for source in sources:
+        source.close()
+
+
+@pytest.mark.parametrize(('encoding', 'shape'), [('bgr8', (48, 64, 3)), ('mono8', (48, 64))])
+def test_frames_come_with_the_time_at_which_they_came(camera, open_stream, encoding, shape):
+    before_ns = time.time_ns()
+    source = open_stream(camera.url, encoding=encoding)
+    first, second = source.read(), source.read()
+    assert first.image.shape == shape
+    assert first.image.mean() == pytest.approx(90, abs=CODING_LOSS)
+    assert before_ns < first.stamp_ns < second.stamp_ns <= time.time_ns()
+
+
+def test_nobody_there_is_said_without_the_password(open_stream):
+    source = open_stream('http://user:secret@127.0.0.1:1/stream')
+    with pytest.raises(SourceLostError, match=r'^http://127\.0\.0\.1:1/stream cannot be opened'):
+        source.read()
+
+
+def test_a_camera_that_falls_silent_is_lost(camera, open_stream):
+    source = open_stream(camera.url)
+    source.read()
+    camera.stalled.set()
+    with pytest.raises(SourceLostError, match='gives no more pictures'):
+        while True:
+            source.read()
+
+
+def test_a_read_that_waits_ends_at_once_when_interrupted(camera, open_stream):
+    camera.stalled.set()
+    source = open_stream(camera.url)
+    ended = []
+
+    def read():
+        with pytest.raises(SourceLostError):
+            source.read()
+        ended.append(True)
+
+    thread = Thread(target=read)
+    thread.start()
+    source.interrupt()
+    thread.join(timeout=5)
+    assert ended
