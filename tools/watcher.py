@@ -12,7 +12,7 @@ from rclpy.time import Time
 from sensor_msgs.msg import Image
 
 from fisheye_bridge.images import to_array
-from fisheye_bridge.qos import IMAGE, LATCHED
+from fisheye_bridge.qos import IMAGE_INPUT, LATCHED
 
 
 class Watcher:
@@ -36,7 +36,7 @@ class Watcher:
         rclpy.init(context=self._context, domain_id=domain)
         self.node = rclpy.create_node('watcher', context=self._context, namespace=namespace)
         for kind, topic, take, qos in (
-            (Image, 'panorama/image', self._take, IMAGE),
+            (Image, 'panorama/image', self._take, IMAGE_INPUT),
             (Projection, 'panorama/projection', self._take_projection, LATCHED),
             (Overlaps, 'panorama/overlap', self._take_overlaps, LATCHED),
         ):

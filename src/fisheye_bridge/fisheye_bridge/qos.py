@@ -4,7 +4,10 @@ from rclpy.qos import DurabilityPolicy, QoSPolicyKind, QoSProfile, ReliabilityPo
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
 IMAGE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
-"""Images: nothing is lost on the way, and only the newest waits."""
+"""Images as they are published: nothing is lost on the way, and only the newest waits."""
+
+IMAGE_INPUT = QoSProfile(depth=3, reliability=ReliabilityPolicy.RELIABLE)
+"""Images as they are taken: a moment without the processor loses none."""
 
 LATCHED = QoSProfile(
     depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL

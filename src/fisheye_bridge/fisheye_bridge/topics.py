@@ -9,7 +9,7 @@ from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
 from fisheye_bridge.images import from_jpeg, to_array, to_jpeg
-from fisheye_bridge.qos import ADJUSTABLE, IMAGE
+from fisheye_bridge.qos import ADJUSTABLE, IMAGE, IMAGE_INPUT
 from fisheye_geometry.errors import FisheyeError
 
 TRANSPORTS = ('raw', 'compressed')
@@ -78,7 +78,7 @@ class ImageSubscription:
             CompressedImage if jpeg else Image,
             self._topic,
             self._take,
-            IMAGE,
+            IMAGE_INPUT,
             callback_group=group,
             qos_overriding_options=ADJUSTABLE,
         )
