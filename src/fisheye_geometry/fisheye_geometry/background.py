@@ -26,5 +26,8 @@ class Background:
         self._thread.shutdown(cancel_futures=True)
 
     def _report(self, future: Future) -> None:
-        if not future.cancelled() and isinstance(error := future.exception(), FisheyeError):
+        error = None if future.cancelled() else future.exception()
+        if isinstance(error, FisheyeError):
             self._on_error(error)
+        elif error:
+            raise error

@@ -60,6 +60,8 @@ _KINDS = {
 }
 
 SURFACES = tuple(_KINDS)
+_MAX_PIXELS = 50_000_000
+"""Above it the maps of a single camera would take more than 300 MB."""
 SCALES = ('preserve_area', 'fit')
 
 
@@ -95,12 +97,17 @@ class Surface:
             raise GeometryError(
                 f'focal_px is {self.focal_px}; expected a finite number of pixels above 0'
             )
-        for side in (self.width, self.height):
-            if not 1 <= side <= MAX_PICTURE_SIDE_PX:
-                raise GeometryError(
-                    f'a surface of {self.width}x{self.height} px is not possible; each side must '
-                    f'have 1 to {MAX_PICTURE_SIDE_PX} px (see hfov_deg, vfov_deg, width, height)'
-                )
+        sides = self.width, self.height
+        if not (
+            min(sides) >= 1
+            and max(sides) <= MAX_PICTURE_SIDE_PX
+            and self.width * self.height <= _MAX_PIXELS
+        ):
+            raise GeometryError(
+                f'a surface of {self.width}x{self.height} px is not possible; each side must have '
+                f'1 to {MAX_PICTURE_SIDE_PX} px and all {_MAX_PIXELS / 1e6:g} million at the most '
+                '(see hfov_deg, vfov_deg, width, height)'
+            )
 
     @property
     def turns_are_shifts(self) -> bool:

@@ -11,7 +11,6 @@ from fisheye_msgs.msg import Overlap, Overlaps, Particle, Projection
 from fisheye_msgs.srv import CalibrateOverlap
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
-from rclpy.time import Time
 from std_msgs.msg import Header
 
 from fisheye_bridge.diagnostics import ERROR, WARN, Diagnostics, Report
@@ -19,12 +18,14 @@ from fisheye_bridge.images import ImageBuffer, converted
 from fisheye_bridge.parameters import Parameters
 from fisheye_bridge.projection import projection_of
 from fisheye_bridge.qos import LATCHED
+from fisheye_bridge.stamps import stamp_of
 from fisheye_bridge.topics import ImagePublisher
 from fisheye_geometry.errors import FisheyeError, SettingError
 from panorama_stitch import overlap
 from panorama_stitch.compositor import Compositor
 from panorama_stitch.live import LiveStitcher
 from panorama_stitch.settings import PanoramaOutputSettings
+from panorama_stitch.stale import write_age
 
 FRAME_ID = 'panorama_optical_frame'
 _WARNING_PAUSE_S = 5.0
@@ -78,7 +79,13 @@ class PanoramaBase(Node):
     def _apply(self, settings: PanoramaOutputSettings) -> None:
         self.live.apply(settings)
 
-    def _publish(self, compositor: Compositor, images: Sequence[np.ndarray], stamp_ns: int):
+    def _publish(
+        self,
+        compositor: Compositor,
+        images: Sequence[np.ndarray],
+        stamp_ns: int,
+        ages_s: dict[str, float],
+    ) -> None:
         if not self._image.wanted:
             return
         surface = compositor.layout.surface
@@ -86,6 +93,9 @@ class PanoramaBase(Node):
         if self._buffer is None or not self._buffer.fits(*size):
             self._buffer = ImageBuffer(*size)
         compositor.compose(images, self._buffer.array)
+        for camera, age_s in ages_s.items():
+            columns = compositor.layout.columns(self.settings.cameras.index(camera))
+            write_age(self._buffer.array, columns, camera, age_s)
         self._buffer.message.header = _header(stamp_ns)
         self._image.publish(self._buffer.message, self._buffer.array, self.settings.jpeg_quality)
         self._published += 1
@@ -131,6 +141,10 @@ class PanoramaBase(Node):
             for result in self.live.stitcher.in_use(self.settings):
                 if not result.found:
                     report.add(WARN, 'no overlap: frames are side by side')
+        ages_s = self.live.ages_s()
+        all_stale = len(ages_s) == len(self.settings.cameras)
+        for camera, age_s in ages_s.items():
+            report.add(ERROR if all_stale else WARN, f'{camera}: no picture for {age_s:.0f} s')
         report.values['panoramas published'] = self._published
         report.values['pairs overtaken'] = self.live.dropped
         for camera, count in self.live.pairing.unpaired.items():
@@ -146,7 +160,7 @@ class PanoramaBase(Node):
 
 
 def _header(stamp_ns: int) -> Header:
-    return Header(stamp=Time(nanoseconds=stamp_ns).to_msg(), frame_id=FRAME_ID)
+    return Header(stamp=stamp_of(stamp_ns), frame_id=FRAME_ID)
 
 
 def _overlap_message(result: overlap.Overlap, names, surface) -> Overlap:

@@ -1,39 +1,46 @@
-"""The live line: frames -> pair -> compose -> publish, with measuring and preparing beside it."""
+"""The live line: frames -> pair -> compose -> publish, whatever the cameras do."""
 
-from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import Future
-from pathlib import Path
 from threading import Lock
 from time import monotonic
+from typing import NamedTuple
 
 import numpy as np
 
 from fisheye_capture.newest import Newest
-from fisheye_geometry.background import Background
-from fisheye_geometry.errors import FisheyeError, OverlapError
+from fisheye_geometry.errors import FisheyeError
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.surface import Surface
 from panorama_stitch.compositor import Compositor
-from panorama_stitch.overlap import Overlap
-from panorama_stitch.overlap_file import read_overlaps, write_overlaps
-from panorama_stitch.pairing import FramePairing, Stamped
+from panorama_stitch.pairing import FramePairing
+from panorama_stitch.preparation import Preparation
 from panorama_stitch.settings import PanoramaOutputSettings
+from panorama_stitch.stale import dimmed
 from panorama_stitch.stitcher import Stitcher
 
-_REMEMBERED = 5
-"""Pairs that an overlap is measured on."""
-_BETWEEN_REMEMBERED_S = 0.2
-_FIRST_PAUSE_S, _LONGEST_PAUSE_S = 2.0, 60.0
-"""Between two tries to find an overlap."""
+
+class _Last(NamedTuple):
+    """The last frame of a camera, and when it came."""
+
+    image: np.ndarray | None
+    arrived_s: float
+
+
+class _Group(NamedTuple):
+    """A picture of each camera; those with an age are not live."""
+
+    images: list[np.ndarray]
+    stamp_ns: int
+    ages_s: dict[str, float]
 
 
 class LiveStitcher:
     """Stitches frames as they come.
 
-    Frames may be given from any thread. The newest group is composed in a thread of its own, an
-    older one that still waits then is dropped; overlaps are measured and compositors prepared in
-    another thread, while frames go on with the former compositor.
+    Frames may be given from any thread. The newest group is composed in a thread of its own; an
+    older one that still waits then is dropped. Where a camera is silent, the others go on beside
+    its last picture, dimmed.
 
     Attributes
     ----------
@@ -41,15 +48,13 @@ class LiveStitcher:
         What is known of the cameras.
     pairing : FramePairing
         What waits for its partner.
-    compositor : Compositor or None
-        In use now.
     """
 
     def __init__(
         self,
         settings: PanoramaOutputSettings,
         *,
-        publish: Callable[[Compositor, list[np.ndarray], int], None],
+        publish: Callable[[Compositor, list[np.ndarray], int, dict[str, float]], None],
         changed: Callable[[], None],
         warn: Callable[[str], None],
     ):
@@ -60,7 +65,8 @@ class LiveStitcher:
         settings
             Also say which cameras there are.
         publish
-            Called in the composing thread with the compositor, the pictures and the older stamp.
+            Called in the composing thread with the compositor, the pictures, the older stamp, and
+            the ages of those pictures that are not live, s.
         changed
             Called when there is a new compositor.
         warn
@@ -68,29 +74,46 @@ class LiveStitcher:
         """
         self.stitcher = Stitcher(settings.cameras)
         self.pairing = FramePairing(settings.cameras, round(settings.max_pair_skew_s * 1e9))
-        self.compositor: Compositor | None = None
-        self._settings = settings
-        self._publish, self._changed, self._warn = publish, changed, warn
-        self._background = Background(self._failed)
+        self._preparation = Preparation(self.stitcher, settings, changed, warn)
+        self._publish, self._warn = publish, warn
         self._lock = Lock()
-        self._recent: deque[list[np.ndarray]] = deque(maxlen=_REMEMBERED)
-        self._remembered_at = 0.0
-        self._prepare_at = 0.0
-        self._pause_s = _FIRST_PAUSE_S
-        self._preparing: Future | None = None
+        self._last = {camera: _Last(None, monotonic()) for camera in settings.cameras}
+        self._dark: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         self._composing = Newest(self._compose, 'compose')
+
+    @property
+    def compositor(self) -> Compositor | None:
+        """What composes the panoramas now, None before the first."""
+        return self._preparation.compositor
 
     @property
     def dropped(self) -> int:
         """Groups that were overtaken by a newer one."""
         return self._composing.dropped
 
+    def ages_s(self) -> dict[str, float]:
+        """Give the cameras that are stale, each with the age of its last frame, s."""
+        now, limit = monotonic(), self._preparation.settings.stale_after_s
+        ages = {camera: now - last.arrived_s for camera, last in self._last.items()}
+        return {camera: age for camera, age in ages.items() if age > limit}
+
     def take(self, camera: str, stamp_ns: int, image: np.ndarray) -> None:
-        """Take a frame of a camera; nobody may write to it afterwards."""
+        """Take a frame of a camera; nobody may write to it afterwards.
+
+        Raises
+        ------
+        ImageFormatError
+            If it is not of the size that the camera is known to give.
+        """
+        self.stitcher.check(camera, image)
         with self._lock:
-            group = self.pairing.add(camera, stamp_ns, image)
-            if group is not None:
-                self._composing.put(group)
+            self._last[camera] = _Last(image, monotonic())
+            pair = self.pairing.add(camera, stamp_ns, image)
+            if pair is not None:
+                images = [member.frame for member in pair]
+                self._composing.put(_Group(images, min(member.stamp_ns for member in pair), {}))
+            elif ages_s := self.ages_s():
+                self._go_on_without(ages_s, camera, stamp_ns)
 
     def place(
         self, camera: str, source: Lens | Surface, surface: Surface, interpolation: str = 'linear'
@@ -98,8 +121,9 @@ class LiveStitcher:
         """Say what a camera's pictures show."""
         with self._lock:
             if self.stitcher.place(camera, source, surface, interpolation):
-                self._recent.clear()
-                self._prepare_at = 0.0
+                self.pairing.clear()
+                self._last[camera] = _Last(None, self._last[camera].arrived_s)
+                self._preparation.renew(forget=True)
 
     def apply(self, settings: PanoramaOutputSettings) -> None:
         """Use other settings from the next frames on.
@@ -111,108 +135,50 @@ class LiveStitcher:
         """
         if self.stitcher.is_complete:
             self.stitcher.in_use(settings)
-        self._settings = settings
+        self._preparation.settings = settings
         self.pairing.max_skew_ns = round(settings.max_pair_skew_s * 1e9)
-        self._prepare_at = 0.0
+        self._preparation.renew(forget=False)
 
     def calibrate(self, method: str, save: bool) -> Future:
-        """Measure the overlaps anew, on the recent groups and off the frame path.
-
-        Returns
-        -------
-        Future
-            Of a list of `Overlap`. Where no overlap is found, one that was found before stays in
-            use.
-        """
-        return self._background.do(self._calibrate, method, save)
+        """Measure the overlaps anew, off the frame path; as `Preparation.calibrate`."""
+        return self._preparation.calibrate(method, save)
 
     def stop(self) -> None:
         """End the threads."""
         self._composing.stop()
-        self._background.stop()
+        self._preparation.stop()
 
-    def _compose(self, group: list[Stamped]) -> None:
-        images = [member.frame for member in group]
-        self._remember(images)
-        self._prepare_if_due(images)
+    def _go_on_without(self, ages_s: dict[str, float], camera: str, stamp_ns: int) -> None:
+        """Show what lives beside the last pictures of the rest; the first living sets the pace."""
+        living = [name for name in self._last if name not in ages_s]
+        if camera != living[0] or not self.stitcher.is_complete:
+            return
+        channels = self._last[camera].image.shape[2:]
+        images = [
+            self.stitcher.black(name, channels) if last.image is None else last.image
+            for name, last in self._last.items()
+        ]
+        self._composing.put(_Group(images, stamp_ns, ages_s))
+
+    def _compose(self, group: _Group) -> None:
+        if not group.ages_s:
+            self._preparation.remember(group.images)
+        self._preparation.go_on(group.images)
         if self.compositor is None:
             return
+        images = [
+            self._dimmed(camera, image) if camera in group.ages_s else image
+            for camera, image in zip(self.stitcher.cameras, group.images, strict=True)
+        ]
         try:
-            self._publish(self.compositor, images, min(member.stamp_ns for member in group))
+            self._publish(self.compositor, images, group.stamp_ns, group.ages_s)
         except FisheyeError as error:
             self._warn(f'a pair of frames was dropped: {error}')
 
-    def _remember(self, images: list[np.ndarray]) -> None:
-        now = monotonic()
-        with self._lock:
-            if now - self._remembered_at >= _BETWEEN_REMEMBERED_S or not self._recent:
-                self._remembered_at = now
-                self._recent.append(images)
-
-    def _prepare_if_due(self, images: Sequence[np.ndarray]) -> None:
-        busy = self._preparing is not None and not self._preparing.done()
-        if not busy and self.stitcher.is_complete and monotonic() >= self._prepare_at:
-            self._prepare_at = float('inf')
-            self._preparing = self._background.do(self._prepare, images)
-
-    def _failed(self, error: FisheyeError) -> None:
-        self._warn(str(error))
-        if self.compositor is None:
-            self._prepare_at = monotonic() + _FIRST_PAUSE_S
-
-    def _prepare(self, images: Sequence[np.ndarray]) -> None:
-        """Find overlaps if there are none, and build the compositor that uses them."""
-        settings = self._settings
-        if self.stitcher.overlaps is None and settings.overlap_file:
-            self._read(settings.overlap_file)
-        found = self.stitcher.overlaps and all(o.found for o in self.stitcher.overlaps)
-        if not found and settings.auto_calibrate:
-            measured = self._measure(settings.method)
-            found = all(overlap.found for overlap in measured)
-            if not found:
-                self._prepare_at = monotonic() + self._pause_s
-                self._pause_s = min(2 * self._pause_s, _LONGEST_PAUSE_S)
-            self.stitcher.overlaps = measured
-        self._use(images)
-
-    def _use(self, images: Sequence[np.ndarray]) -> None:
-        self.compositor = self.stitcher.compositor(self._settings, images)
-        self._changed()
-
-    def _read(self, path: str) -> None:
-        if not Path(path).exists():
-            return
-        try:
-            self.stitcher.overlaps = read_overlaps(
-                path, self.stitcher.cameras, self.stitcher.surfaces
-            )
-        except FisheyeError as error:
-            self._warn(f'{error}; the overlap is measured instead')
-
-    def _write(self, overlaps: list[Overlap]) -> None:
-        if not self._settings.overlap_file:
-            raise OverlapError(
-                'the overlap was measured but not saved: overlap_file is empty; expected a path'
-            )
-        write_overlaps(
-            self._settings.overlap_file, overlaps, self.stitcher.cameras, self.stitcher.surfaces
-        )
-
-    def _measure(self, method: str) -> list[Overlap]:
-        with self._lock:
-            groups = list(self._recent)
-        return self.stitcher.measure(groups, self._settings, method)
-
-    def _calibrate(self, method: str, save: bool) -> list[Overlap]:
-        if not self.stitcher.is_complete:
-            raise OverlapError('it is not known yet what every camera sees; are all running?')
-        measured = self._measure(method or self._settings.method)
-        former = self.stitcher.overlaps or measured
-        self.stitcher.overlaps = [
-            new if new.found or not old.found else old
-            for new, old in zip(measured, former, strict=True)
-        ]
-        self._use(self._recent[-1])
-        if save:
-            self._write(measured)
-        return measured
+    def _dimmed(self, camera: str, image: np.ndarray) -> np.ndarray:
+        """Dim a stale picture, once for all the time that it stays."""
+        last, dark = self._dark.get(camera, (None, None))
+        if last is not image:
+            dark = dimmed(image)
+            self._dark[camera] = image, dark
+        return dark

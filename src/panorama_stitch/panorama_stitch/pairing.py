@@ -81,6 +81,11 @@ class FramePairing:
         """How many frames of each camera found no partner."""
         return {camera: track.unpaired for camera, track in self._tracks.items()}
 
+    def clear(self) -> None:
+        """Forget what waits."""
+        for track in self._tracks.values():
+            track.drop_before(len(track.waiting))
+
     def add(self, camera: str, stamp_ns: int, frame: Any) -> list[Stamped] | None:
         """Take a frame; give the group that it completes, in the order of the cameras."""
         self._tracks[camera].add(Stamped(stamp_ns, frame))

@@ -2,15 +2,15 @@
 
 from dataclasses import fields
 
-from fisheye_capture.calibration_url import calibration_of
-from rclpy.time import Time
 from std_msgs.msg import Header
 
 from fisheye_bridge.diagnostics import ERROR
 from fisheye_bridge.images import to_message
 from fisheye_bridge.parameters import Parameters
 from fisheye_bridge.running import run
+from fisheye_bridge.stamps import stamp_of
 from fisheye_bridge.topics import ImagePublisher
+from fisheye_capture.calibration_url import calibration_of
 from fisheye_capture.grabber import Grabber
 from fisheye_capture.settings import CameraSettings, CaptureSettings, FrameSettings
 from fisheye_geometry.errors import CameraFileError
@@ -88,9 +88,7 @@ class _Eye:
         encoding = self._settings.encoding
         self._node.take(self.name, frame.stamp_ns, frame.image, encoding)
         if self._raw.wanted:
-            header = Header(
-                stamp=Time(nanoseconds=frame.stamp_ns).to_msg(), frame_id=self._settings.frame_id
-            )
+            header = Header(stamp=stamp_of(frame.stamp_ns), frame_id=self._settings.frame_id)
             message = to_message(frame.image, encoding, header)
             self._raw.publish(message, frame.image, self._node.settings.jpeg_quality)
 

@@ -1,11 +1,11 @@
 """Stitches corrected pictures of several cameras into one panorama."""
 
 from fisheye_msgs.msg import Projection
-from rclpy.time import Time
 
 from fisheye_bridge.projection import surface_of
 from fisheye_bridge.qos import LATCHED
 from fisheye_bridge.running import run
+from fisheye_bridge.stamps import ns_of
 from fisheye_bridge.topics import ImageSubscription
 from fisheye_geometry.errors import FisheyeError
 from panorama_stitch.base_node import PanoramaBase
@@ -21,7 +21,7 @@ class StitchNode(PanoramaBase):
 
     def _listen(self, camera: str) -> ImageSubscription:
         def take_image(image, encoding, header):
-            self.take(camera, Time.from_msg(header.stamp).nanoseconds, image, encoding)
+            self.take(camera, ns_of(header.stamp), image, encoding)
 
         def take_projection(message):
             try:

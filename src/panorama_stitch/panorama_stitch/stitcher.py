@@ -6,7 +6,7 @@ from math import isnan
 
 import numpy as np
 
-from fisheye_geometry.errors import OverlapError
+from fisheye_geometry.errors import ImageFormatError, OverlapError
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.remap import LEVEL
 from fisheye_geometry.surface import Surface
@@ -62,6 +62,20 @@ class Stitcher:
         if former and former[1] != surface:
             self.overlaps = None
         return True
+
+    def check(self, camera: str, image: np.ndarray) -> None:
+        """Raise an `ImageFormatError` for a picture of another size than the camera's."""
+        place = self._places.get(self.cameras.index(camera))
+        if place and image.shape[:2] != (place[0].height, place[0].width):
+            raise ImageFormatError(
+                f'the picture of {camera} has {image.shape[1]}x{image.shape[0]} px; '
+                f'expected {place[0].width}x{place[0].height} px'
+            )
+
+    def black(self, camera: str, channels: tuple[int, ...]) -> np.ndarray:
+        """Give a picture for a camera that never gave one, (height, width, *channels) uint8."""
+        source = self._places[self.cameras.index(camera)][0]
+        return np.zeros((source.height, source.width, *channels), np.uint8)
 
     def measure(
         self, groups: Sequence[Group], settings: PanoramaOutputSettings, method: str
@@ -129,6 +143,8 @@ class Stitcher:
             if surface.focal_px != focal_px:
                 surface = surface.with_focal(focal_px)
             seen = None
+            if group is not None:
+                self.check(self.cameras[index], group[index])
             if group is not None and isinstance(source, Surface):
                 seen = group[index] > 0 if group[index].ndim == 2 else group[index].any(axis=2)
             views.append(View(source, surface, interpolation, seen=seen))

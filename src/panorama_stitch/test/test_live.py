@@ -1,0 +1,206 @@
+"""The live line: pairs become panoramas, a silent camera is shown as such, and all comes back."""
+
+import threading
+import time
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from fisheye_capture.scene import Scene
+from fisheye_capture.synthetic import synthetic_lens
+from fisheye_geometry.errors import CameraFileError, ImageFormatError, OverlapError
+from fisheye_geometry.remap import Turn
+from panorama_stitch.live import LiveStitcher
+from panorama_stitch.settings import PanoramaSettings
+
+LENS = synthetic_lens(320, 240, np.radians(170))
+YAW = np.radians(140)
+SETTINGS = PanoramaSettings(stale_after_s=0.2)
+DEADLINE_S = 20.0
+STEP_NS = 33_000_000
+
+
+@pytest.fixture(scope='module')
+def pictures():
+    views = [Scene().view(LENS, Turn(yaw_rad=yaw)) for yaw in (-YAW / 2, YAW / 2)]
+    return dict(zip(('left', 'right'), (view.frame(0) for view in views), strict=True))
+
+
+class Line:
+    """A live stitcher, what it published, and a hand that feeds it."""
+
+    def __init__(self, settings=SETTINGS):
+        self.published, self.warnings = [], []
+        self.news = threading.Event()
+        self.live = LiveStitcher(
+            settings, publish=self._publish, changed=lambda: None, warn=self.warnings.append
+        )
+        for camera in settings.cameras:
+            self.live.place(camera, LENS, settings.surface_of(LENS))
+        self.stamp_ns = 0
+
+    def _publish(self, compositor, images, stamp_ns, ages_s):
+        surface = compositor.layout.surface
+        out = np.empty((surface.height, surface.width, 3), np.uint8)
+        compositor.compose(images, out)
+        self.published.append((stamp_ns, out, ages_s))
+
+    def feed(self, pictures, until, what):
+        """Feed frames of these cameras until a condition holds."""
+        deadline = time.monotonic() + DEADLINE_S
+        while not until():
+            assert time.monotonic() < deadline, what
+            self.stamp_ns += STEP_NS
+            for camera, picture in pictures.items():
+                self.live.take(camera, self.stamp_ns, picture)
+            self.news.wait(0.01)
+
+
+@pytest.fixture
+def make_line():
+    lines = []
+
+    def make(settings=SETTINGS):
+        lines.append(Line(settings))
+        return lines[-1]
+
+    yield make
+    for line in lines:
+        line.live.stop()
+
+
+def in_use(line):
+    return line.live.stitcher.overlaps[0]
+
+
+def test_pairs_become_panoramas_with_a_measured_offset(make_line, pictures):
+    line = make_line()
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    assert in_use(line).offset_x_px == pytest.approx(YAW * LENS.focal_x_px, abs=1.0)
+    assert line.published[0][2] == {}
+    assert line.warnings == []
+
+
+def test_a_silent_camera_is_shown_as_such_and_comes_back(make_line, pictures):
+    line = make_line()
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    bright = line.published[-1][1]
+    left = {'left': pictures['left']}
+    line.feed(left, lambda: line.published[-1][2], 'a panorama of the living side')
+    stamp_ns, dimmed, ages_s = line.published[-1]
+    assert list(ages_s) == ['right']
+    assert stamp_ns == line.stamp_ns, 'the stamp of the living side'
+    half = bright.shape[1] // 3
+    assert (dimmed[:, :half] == bright[:, :half]).all()
+    assert dimmed[:, -half:].mean() < 0.5 * bright[:, -half:].mean()
+    line.feed(pictures, lambda: not line.published[-1][2], 'both sides again')
+    assert (line.published[-1][1] == bright).all()
+
+
+def test_a_camera_that_never_came_is_black_and_then_measured(make_line, pictures):
+    line = make_line()
+    right = {'right': pictures['right']}
+    line.feed(right, lambda: line.published, 'a panorama of one camera')
+    _, picture, ages_s = line.published[-1]
+    assert list(ages_s) == ['left']
+    assert picture[:, : picture.shape[1] // 3].max() == 0
+    line.feed(
+        pictures, lambda: line.live.stitcher.overlaps and not line.published[-1][2], 'both sides'
+    )
+    assert in_use(line).found
+
+
+def test_with_both_silent_nothing_is_published(make_line, pictures):
+    line = make_line()
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    deadline = time.monotonic() + DEADLINE_S
+    while len(line.live.ages_s()) < 2:
+        assert time.monotonic() < deadline
+        line.news.wait(0.02)
+    count = len(line.published)
+    line.news.wait(0.3)
+    assert len(line.published) == count
+
+
+def test_panoramas_go_on_while_the_overlap_is_measured(make_line, pictures):
+    line = make_line()
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    answer = line.live.calibrate('correlation', save=False)
+    line.feed(pictures, answer.done, 'an answer')
+    assert answer.result()[0].found
+
+
+def test_an_answer_without_overlap_never_replaces_a_good_one(make_line, pictures):
+    line = make_line()
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    good = in_use(line)
+    dark = {camera: np.zeros_like(picture) for camera, picture in pictures.items()}
+    end = time.monotonic() + 1.5
+    line.feed(dark, lambda: time.monotonic() > end, 'time to forget the bright pictures')
+    assert not line.live.calibrate('', save=False).result(DEADLINE_S)[0].found
+    assert in_use(line) == good
+
+
+def test_night_at_start_is_tried_again(make_line, pictures):
+    line = make_line()
+    dark = {camera: np.zeros_like(picture) for camera, picture in pictures.items()}
+    line.feed(dark, lambda: line.published, 'a dark panorama, side by side')
+    assert not in_use(line).found
+    line.feed(pictures, lambda: in_use(line).found, 'an overlap after all')
+
+
+def test_an_overlap_is_kept_in_its_file(make_line, pictures, tmp_path):
+    path = tmp_path / 'overlap.yaml'
+    settings = replace(SETTINGS, overlap_file=str(path))
+    first = make_line(settings)
+    first.feed(pictures, lambda: first.published, 'a panorama')
+    first.live.calibrate('', save=True).result(DEADLINE_S)
+    second = make_line(replace(settings, auto_calibrate=False))
+    dark = {camera: np.zeros_like(picture) for camera, picture in pictures.items()}
+    second.feed(dark, lambda: second.published, 'a panorama')
+    assert in_use(second).offset_x_px == pytest.approx(in_use(first).offset_x_px)
+    path.write_text('version: 77')
+    third = make_line(settings)
+    third.feed(pictures, lambda: third.published, 'a panorama')
+    assert in_use(third).found
+    assert 'the overlap is measured instead' in third.warnings[0]
+
+
+def test_what_cannot_be_done_is_said(make_line, pictures, tmp_path):
+    line = make_line()
+    with pytest.raises(OverlapError, match='no pair of frames has come yet'):
+        line.live.calibrate('', save=False).result(DEADLINE_S)
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    with pytest.raises(OverlapError, match='overlap_file is empty'):
+        line.live.calibrate('', save=True).result(DEADLINE_S)
+    with pytest.raises(ImageFormatError, match='right has 10x10 px; expected 320x240'):
+        line.live.take('right', 1, np.zeros((10, 10, 3), np.uint8))
+    (tmp_path / 'file').write_text('')
+    line.live.apply(replace(SETTINGS, overlap_file=str(tmp_path / 'file' / 'overlap.yaml')))
+    with pytest.raises(CameraFileError, match='cannot be written'):
+        line.live.calibrate('', save=True).result(DEADLINE_S)
+
+
+def test_a_setting_applies_to_the_next_frames(make_line, pictures):
+    line = make_line()
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    width = line.published[-1][1].shape[1]
+    line.live.apply(replace(SETTINGS, offset_x_px=(200.0,)))
+    line.feed(pictures, lambda: line.published[-1][1].shape[1] < width, 'a narrower panorama')
+    line.live.apply(SETTINGS)
+    line.feed(pictures, lambda: line.published[-1][1].shape[1] == width, 'the measured one back')
+
+
+def test_another_lens_is_measured_anew(make_line, pictures):
+    line = make_line()
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    former = in_use(line)
+    small = synthetic_lens(160, 120, np.radians(170))
+    shrunk = {name: cv2.resize(picture, (160, 120)) for name, picture in pictures.items()}
+    for camera in shrunk:
+        line.live.place(camera, small, SETTINGS.surface_of(small))
+    count = len(line.published)
+    line.feed(shrunk, lambda: len(line.published) > count + 3, 'panoramas of the other lens')
+    assert in_use(line).offset_x_px == pytest.approx(former.offset_x_px / 2, abs=1.0)
