@@ -1,0 +1,131 @@
+"""Shows the panorama in a browser."""
+
+from concurrent.futures import Future
+from time import monotonic
+
+from diagnostic_msgs.msg import DiagnosticArray
+from fisheye_msgs.msg import Overlaps, Projection
+from fisheye_msgs.srv import CalibrateOverlap
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.time import Time
+from sensor_msgs.msg import CompressedImage
+
+from fisheye_bridge.diagnostics import Diagnostics
+from fisheye_bridge.parameters import Parameters
+from fisheye_bridge.projection import surface_of
+from fisheye_bridge.qos import IMAGE, LATCHED
+from fisheye_bridge.running import run
+from fisheye_geometry.errors import FisheyeError, OverlapError
+from panorama_stitch.viewer_server import ViewerServer
+from panorama_stitch.viewer_settings import ViewerSettings
+from panorama_stitch.viewer_status import ViewerStatus
+
+_TELL_S = 0.5
+
+
+class ViewerNode(Node):
+    """panorama/image/compressed, and what is known of it, to browsers."""
+
+    def __init__(self, **kwargs):
+        super().__init__('viewer', **kwargs)
+        self._declared = Parameters(self, ViewerSettings)
+        self._status = ViewerStatus()
+        self._image = None
+        for kind, topic, take, qos in (
+            (Projection, 'panorama/projection', self._take_projection, LATCHED),
+            (Overlaps, 'panorama/overlap', self._take_overlaps, LATCHED),
+            (DiagnosticArray, '/diagnostics', self._take_diagnostics, 10),
+        ):
+            self.create_subscription(kind, topic, take, qos)
+        self._client = self.create_client(CalibrateOverlap, 'calibrate_overlap')
+        self._watch = self.create_guard_condition(self._follow_browsers)
+        self._server = ViewerServer(
+            self._declared.settings, calibrate=self._calibrate, watched=self._watch.trigger
+        )
+        self._server.start()
+        # The page goes on while a recording, and with it the time of ROS, stands still.
+        self.create_timer(_TELL_S, self._tell, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._diagnostics = Diagnostics(self, self._report)
+        self.get_logger().info(f'the panorama is at {self._server.url}')
+
+    def destroy_node(self) -> None:
+        """Say goodbye to the browsers too."""
+        self._server.stop()
+        super().destroy_node()
+
+    def _follow_browsers(self) -> None:
+        """Subscribe while somebody looks: the JPEG is made for subscribers only."""
+        if self._server.watchers and self._image is None:
+            self._image = self.create_subscription(
+                CompressedImage, 'panorama/image/compressed', self._take_image, IMAGE
+            )
+        elif not self._server.watchers and self._image is not None:
+            self.destroy_subscription(self._image)
+            self._image = None
+
+    def _take_image(self, message) -> None:
+        delay_ns = (self.get_clock().now() - Time.from_msg(message.header.stamp)).nanoseconds
+        self._status.picture(monotonic(), delay_ns / 1e9)
+        self._server.show(message.data.tobytes())
+
+    def _take_projection(self, message) -> None:
+        try:
+            surface = surface_of(message)
+        except FisheyeError as error:
+            self.get_logger().warning(f'panorama/projection refused: {error}')
+            return
+        self._server.tell(projection=vars(surface))
+
+    def _take_overlaps(self, message) -> None:
+        self._server.tell(
+            overlaps=[
+                {
+                    'left': overlap.left_camera,
+                    'right': overlap.right_camera,
+                    'found': overlap.found,
+                    'confidence': overlap.confidence,
+                }
+                for overlap in message.overlaps
+            ]
+        )
+
+    def _take_diagnostics(self, message) -> None:
+        """Keep what the nodes of this rig report: those in the viewer's namespace."""
+        space = self.get_namespace().strip('/')
+        prefix = f'{space}/' if space else ''
+        for status in message.status:
+            name = status.name.lstrip('/')
+            if name.startswith(prefix):
+                self._status.heard(
+                    monotonic(),
+                    name.removeprefix(prefix),
+                    ord(status.level),
+                    status.message,
+                    {entry.key: entry.value for entry in status.values},
+                )
+
+    def _tell(self) -> None:
+        self._server.tell(**self._status.told(monotonic()))
+
+    def _calibrate(self) -> Future:
+        """Ask the stitch node to measure; called in the server's thread."""
+        if not self._client.service_is_ready():
+            raise OverlapError('nobody offers calibrate_overlap: is the stitch node running?')
+        said = Future()
+        asked = self._client.call_async(CalibrateOverlap.Request())
+
+        def say(done):
+            if said.set_running_or_notify_cancel():
+                said.set_result(done.result().message)
+
+        asked.add_done_callback(say)
+        return said
+
+    def _report(self, report) -> None:
+        report.values['browsers'] = self._server.watchers
+
+
+def main() -> int:
+    """Run the node."""
+    return run(ViewerNode)

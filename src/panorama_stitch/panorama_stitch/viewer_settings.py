@@ -1,0 +1,24 @@
+"""Settings of the viewer node: the only place with their defaults."""
+
+from dataclasses import dataclass
+
+from fisheye_geometry.settings import setting
+
+
+@dataclass(frozen=True)
+class ViewerSettings:
+    """What the viewer node can be told."""
+
+    host: str = setting(
+        '127.0.0.1',
+        'Address to serve on. 0.0.0.0 lets other machines look; the buttons then need the token '
+        'that is printed at start.',
+    )
+    port: int = setting(8080, 'Port to serve on; 0: a free one.', minimum=0, maximum=65535)
+    max_clients: int = setting(8, 'Browsers that may look at once.', minimum=1, maximum=100)
+    stale_after_s: float = setting(
+        1.0,
+        'A picture that is older is shown to nobody new, and the page says that none comes.',
+        minimum=0.1,
+        maximum=60.0,
+    )

@@ -1,0 +1,99 @@
+// Where a pixel of the panorama looks, and the virtual camera that looks into it.
+// Rays are [x right, y down, z ahead]; angles are radians, bearings positive to the right.
+
+/** Surfaces by number, as the shader knows them. */
+export const KINDS = ['cylindrical', 'equirectangular', 'rectilinear'];
+
+const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
+
+/** What the panorama shows: a message of panorama/projection. */
+export class Projection {
+  constructor(message) {
+    Object.assign(this, message);
+  }
+
+  /** Ray of a pixel; integers are pixel centres. */
+  ray(x, y) {
+    const a = (x - this.center_x_px) / this.focal_px;
+    const b = (y - this.center_y_px) / this.focal_px;
+    if (this.kind === 'cylindrical') return [Math.sin(a), b, Math.cos(a)];
+    if (this.kind === 'rectilinear') return [a, b, 1];
+    return [Math.cos(b) * Math.sin(a), Math.sin(b), Math.cos(b) * Math.cos(a)];
+  }
+
+  /** Pixel [x, y] of a ray; null where the surface cannot show it. */
+  pixel([x, y, z]) {
+    const side = Math.hypot(x, z);
+    let point = [Math.atan2(x, z), Math.atan2(y, side)];
+    if (this.kind === 'cylindrical') point[1] = y / side;
+    if (this.kind === 'rectilinear') point = z > 0 ? [x / z, y / z] : null;
+    return point && [
+      this.center_x_px + this.focal_px * point[0],
+      this.center_y_px + this.focal_px * point[1],
+    ];
+  }
+
+  /** The pixel's [bearing, angle above the horizon]. */
+  angles(x, y) {
+    return anglesOf(this.ray(x, y));
+  }
+
+  /** Bearings of the outer edges and angles of the lower and upper ones. */
+  get limits() {
+    const [left] = this.angles(-0.5, this.center_y_px);
+    const [right] = this.angles(this.width - 0.5, this.center_y_px);
+    const [, top] = this.angles(this.center_x_px, -0.5);
+    const [, bottom] = this.angles(this.center_x_px, this.height - 0.5);
+    const beyond = (edge_px) => Math.abs(edge_px - this.center_x_px) >= Math.PI * this.focal_px;
+    const round = this.kind !== 'rectilinear' && beyond(-0.5) && beyond(this.width - 0.5);
+    return { left: round ? -Infinity : left, right: round ? Infinity : right, top, bottom };
+  }
+}
+
+/** [bearing, angle above the horizon] of a ray. */
+export function anglesOf([x, y, z]) {
+  return [Math.atan2(x, z), -Math.atan2(y, Math.hypot(x, z))];
+}
+
+const START = { yaw: 0, pitch: 0, fov: Math.PI / 2 };
+const NARROWEST = Math.PI / 36;
+const WIDEST = (120 / 180) * Math.PI;
+
+/** A camera without distortion that is turned about the vertical and up or down. */
+export class View {
+  constructor() {
+    this.reset();
+  }
+
+  /** Look straight ahead. */
+  reset() {
+    Object.assign(this, START);
+  }
+
+  /** Focal length for a picture of this size; `fov` spans its longer side. */
+  focal(width, height) {
+    return Math.max(width, height) / 2 / Math.tan(this.fov / 2);
+  }
+
+  /** Ray of the point (u, v) right of and below the centre, in focal lengths. */
+  ray(u, v) {
+    const [cp, sp, cy, sy] = [Math.cos(this.pitch), Math.sin(this.pitch),
+      Math.cos(this.yaw), Math.sin(this.yaw)];
+    const [y, z] = [v * cp - sp, v * sp + cp];
+    return [u * cy + z * sy, y, z * cy - u * sy];
+  }
+
+  /** Look at a bearing and an angle above the horizon, as far as the panorama goes. */
+  turnTo(yaw, pitch, projection) {
+    const { left, right, top, bottom } = projection.limits;
+    const round = Number.isFinite(left) ? 0 : 2 * Math.PI * Math.round(yaw / (2 * Math.PI));
+    this.yaw = clamp(yaw - round, left, right);
+    this.pitch = clamp(pitch, bottom, top);
+  }
+
+  /** Make things `factor` times as large. */
+  zoom(factor) {
+    const half = Math.atan(Math.tan(this.fov / 2) / factor);
+    this.fov = clamp(2 * half, NARROWEST, WIDEST);
+  }
+}

@@ -1,0 +1,90 @@
+// The view into the panorama: a shader asks for each pixel where its ray meets the panorama.
+
+import { KINDS } from '/geometry.js';
+
+const VERTEX = `
+  attribute vec2 corner;
+  varying vec2 point;
+  uniform vec2 reach;
+  void main() {
+    point = corner * reach;
+    gl_Position = vec4(corner.x, -corner.y, 0.0, 1.0);
+  }`;
+
+const FRAGMENT = `
+  precision highp float;
+  varying vec2 point;
+  uniform sampler2D panorama;
+  uniform mat3 turn;
+  uniform int kind;
+  uniform vec2 center, size;
+  uniform float focal;
+  void main() {
+    vec3 ray = turn * vec3(point, 1.0);
+    float side = length(ray.xz);
+    vec2 place = vec2(atan(ray.x, ray.z), kind == 0 ? ray.y / side : atan(ray.y, side));
+    if (kind == 2) place = ray.xy / ray.z;
+    vec2 where = (center + focal * place + 0.5) / size;
+    bool inside = all(greaterThanEqual(where, vec2(0.0))) && all(lessThanEqual(where, vec2(1.0)));
+    if (kind == 2 && ray.z <= 0.0) inside = false;
+    gl_FragColor = inside ? texture2D(panorama, where) : vec4(0.063, 0.082, 0.106, 1.0);
+  }`;
+
+export class Look {
+  /** Throws an Error where the browser has no WebGL. */
+  constructor(canvas) {
+    this.canvas = canvas;
+    this.gl = canvas.getContext('webgl', { antialias: false, depth: false });
+    if (!this.gl) throw new Error('this browser has no WebGL');
+    this.prepare();
+    canvas.addEventListener('webglcontextlost', (event) => event.preventDefault());
+    canvas.addEventListener('webglcontextrestored', () => this.prepare());
+  }
+
+  prepare() {
+    const { gl } = this;
+    this.widest = gl.getParameter(gl.MAX_TEXTURE_SIZE);
+    const program = gl.createProgram();
+    for (const [kind, source] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, FRAGMENT]]) {
+      const shader = gl.createShader(kind);
+      gl.shaderSource(shader, source);
+      gl.compileShader(shader);
+      gl.attachShader(program, shader);
+    }
+    gl.bindAttribLocation(program, 0, 'corner');
+    gl.linkProgram(program);
+    gl.useProgram(program);
+    this.at = (name) => gl.getUniformLocation(program, name);
+    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ARRAY_BUFFER, new Float32Array([-1, -1, 1, -1, -1, 1, 1, 1]), gl.STATIC_DRAW);
+    gl.enableVertexAttribArray(0);
+    gl.vertexAttribPointer(0, 2, gl.FLOAT, false, 0, 0);
+    gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
+    for (const name of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) {
+      gl.texParameteri(gl.TEXTURE_2D, name, gl.CLAMP_TO_EDGE);
+    }
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
+    this.shown = null;
+  }
+
+  draw(bitmap, projection, view) {
+    const { gl, canvas } = this;
+    if (bitmap !== this.shown) {
+      gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGB, gl.RGB, gl.UNSIGNED_BYTE, bitmap);
+      this.shown = bitmap;
+    }
+    const focal = view.focal(canvas.width, canvas.height);
+    const [right, down, ahead] = [view.ray(1, 0), view.ray(0, 1), view.ray(0, 0)];
+    const ray = [0, 1, 2];
+    gl.viewport(0, 0, canvas.width, canvas.height);
+    gl.uniform2f(this.at('reach'), canvas.width / 2 / focal, canvas.height / 2 / focal);
+    gl.uniformMatrix3fv(this.at('turn'), false, [
+      ...ray.map((i) => right[i] - ahead[i]), ...ray.map((i) => down[i] - ahead[i]), ...ahead,
+    ]);
+    gl.uniform1i(this.at('kind'), KINDS.indexOf(projection.kind));
+    gl.uniform2f(this.at('center'), projection.center_x_px, projection.center_y_px);
+    gl.uniform2f(this.at('size'), projection.width, projection.height);
+    gl.uniform1f(this.at('focal'), projection.focal_px);
+    gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
+  }
+}

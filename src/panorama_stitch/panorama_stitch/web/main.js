@@ -1,0 +1,100 @@
+// The viewer: pictures and state come in, and a person looks around.
+
+import { Buttons } from '/buttons.js';
+import * as controls from '/controls.js';
+import { Live } from '/live.js';
+import { Screen } from '/screen.js';
+import { Status } from '/status.js';
+
+const $ = (id) => document.getElementById(id);
+
+/** What pointer and keys can do. */
+class Viewer {
+  constructor(screen) {
+    this.screen = screen;
+    controls.dragTo($('look'), this);
+    controls.wheelTo($('whole'), this);
+    controls.pressTo($('map'), this);
+    controls.keysTo(this);
+    $('toggle').addEventListener('click', () => this.toggle());
+    $('whole').addEventListener('click', (event) => {
+      this.lookAt($('whole'), controls.inside($('whole'), event));
+    });
+    for (const canvas of [$('look'), $('whole'), $('map')]) {
+      canvas.addEventListener('pointermove', (event) => {
+        this.point([canvas, ...controls.inside(canvas, event)]);
+      });
+      canvas.addEventListener('pointerleave', () => this.point(null));
+    }
+  }
+
+  point(pointer) {
+    this.screen.pointer = pointer;
+    this.screen.redraw();
+  }
+
+  drag(right, down) {
+    const { view, focal } = this.screen;
+    this.turn(-right / focal / Math.cos(view.pitch), down / focal);
+  }
+
+  /** Turn by shares of the view. */
+  step(right, up) {
+    this.enter();
+    this.turn(right * this.screen.view.fov, up * this.screen.view.fov);
+  }
+
+  turn(right, up) {
+    const { view, projection } = this.screen;
+    if (projection) view.turnTo(view.yaw + right, view.pitch + up, projection);
+    this.screen.redraw();
+  }
+
+  zoom(factor) {
+    this.enter();
+    this.screen.view.zoom(factor);
+    this.screen.redraw();
+  }
+
+  wheel(canvas, place, factor) {
+    if (canvas === $('whole')) this.lookAt(canvas, place);
+    this.zoom(factor);
+  }
+
+  lookAt(canvas, [x, y]) {
+    const { view, projection, look } = this.screen;
+    if (!projection || !look) return;
+    view.turnTo(...this.screen.angles(canvas, x, y), projection);
+    this.enter();
+    this.screen.redraw();
+  }
+
+  enter() {
+    if (this.screen.look && this.screen.mode !== 'look') this.toggle();
+  }
+
+  reset() {
+    this.screen.view.reset();
+    this.screen.redraw();
+  }
+
+  toggle() {
+    if (this.screen.look) this.screen.mode = this.screen.mode === 'look' ? 'whole' : 'look';
+  }
+}
+
+const screen = new Screen();
+const status = new Status();
+const buttons = new Buttons();
+new Viewer(screen);
+new Live({
+  state(state) {
+    if (state.projection) screen.place(state.projection);
+    buttons.needToken = state.needs_token;
+    status.take(state);
+  },
+  async picture(blob) {
+    if (await screen.picture(blob)) status.picture();
+  },
+  lost: (reason) => status.lose(reason),
+});

@@ -1,0 +1,48 @@
+// The whole panorama on a canvas; with the outline of a view it is a map.
+
+const POINTS = 24; // on each side of the outline
+
+export class Whole {
+  constructor(canvas) {
+    this.canvas = canvas;
+    this.pen = canvas.getContext('2d');
+  }
+
+  draw(bitmap, projection, view = null, ratio = 1) {
+    const { pen, canvas } = this;
+    pen.imageSmoothingQuality = 'high';
+    pen.drawImage(bitmap, 0, 0, canvas.width, canvas.height);
+    if (view) this.outline(projection, view, ratio);
+  }
+
+  outline(projection, view, ratio) {
+    const { pen, canvas } = this;
+    const scale = canvas.width / projection.width;
+    pen.beginPath();
+    let last = null;
+    for (const [u, v] of border(view, ratio)) {
+      const pixel = projection.pixel(view.ray(u, v));
+      const [x, y] = pixel ? pixel.map((p) => (p + 0.5) * scale) : [];
+      const joined = pixel && last !== null && Math.abs(x - last) < canvas.width / 2;
+      if (pixel) pen[joined ? 'lineTo' : 'moveTo'](x, y);
+      last = pixel ? x : null;
+    }
+    for (const [color, width] of [['rgb(0 0 0 / 60%)', 4], ['#fff', 1.6]]) {
+      pen.strokeStyle = color;
+      pen.lineWidth = width * devicePixelRatio;
+      pen.stroke();
+    }
+  }
+}
+
+/** Points (u, v) once around the edge of a view whose size has this ratio of width to height. */
+function* border(view, ratio) {
+  const u = (ratio > 1 ? 1 : ratio) / view.focal(2, 2);
+  const v = (ratio > 1 ? 1 / ratio : 1) / view.focal(2, 2);
+  const corners = [[-u, -v], [u, -v], [u, v], [-u, v]];
+  for (let i = 0; i <= 4 * POINTS; i++) {
+    const [a, b] = [corners[Math.floor(i / POINTS) % 4], corners[(Math.floor(i / POINTS) + 1) % 4]];
+    const t = (i % POINTS) / POINTS;
+    yield [a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])];
+  }
+}
