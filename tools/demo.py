@@ -3,6 +3,7 @@
 import argparse
 import json
 import math
+import re
 import sys
 import time
 from pathlib import Path
@@ -24,22 +25,50 @@ def main() -> int:
     domain = unused_domain()
     out = arguments.out
     out.mkdir(parents=True, exist_ok=True)
-    with Rig(domain, out / 'log') as rig, Watcher(domain) as watcher:
+    with Rig(domain, out / 'log') as rig:
         what = arguments.rig or 'the synthetic rig'
         nodes = 'one node' if arguments.composed else 'five nodes'
         print(f'Starting {nodes} on {what} ...', flush=True)
         begin = time.monotonic()
         cameras = camera_parameters(arguments.rig)
         rig.start_all(arguments.composed, cameras, frame_rate_hz=arguments.rate)
-        wait_for(lambda: rig.check_alive() or watcher.newest, START_TIMEOUT_S, 'a first panorama')
-        print(f'First panorama after {time.monotonic() - begin:.1f} s.', flush=True)
-        answer = watcher.calibrate()
-        print(f'/calibrate_overlap: {answer.message}')
-        watch(watcher, rig, arguments.seconds)
-        report(watcher, answer, arguments)
-        cv2.imwrite(str(out / 'panorama.png'), watcher.picture())
-        print(f'Saved {out / "panorama.png"}')
+        if arguments.view:
+            view(rig, arguments.view)
+            return 0
+        with Watcher(domain) as watcher:
+            demonstrate(rig, watcher, begin, arguments)
+    print('To look around in it, live in a browser: make view')
     return 0
+
+
+def view(rig: Rig, host: str) -> None:
+    """Show the panorama in browsers until Ctrl-C."""
+    rig.log('viewer').unlink(missing_ok=True)  # a former run's address
+    rig.start('viewer', host=host)
+    address = wait_for(
+        lambda: rig.check_alive() or re.search(r'http://\S+', rig.log('viewer').read_text()),
+        START_TIMEOUT_S,
+        'the start of the viewer',
+    )
+    print(f'Open {address[0]} in a browser. Ctrl-C ends it.', flush=True)
+    try:
+        while True:
+            rig.check_alive()
+            time.sleep(0.5)
+    except KeyboardInterrupt:
+        print()
+
+
+def demonstrate(rig: Rig, watcher: Watcher, begin: float, arguments: argparse.Namespace) -> None:
+    """Measure and save what the rig gives; `begin` is when it was started."""
+    wait_for(lambda: rig.check_alive() or watcher.newest, START_TIMEOUT_S, 'a first panorama')
+    print(f'First panorama after {time.monotonic() - begin:.1f} s.', flush=True)
+    answer = watcher.calibrate()
+    print(f'/calibrate_overlap: {answer.message}')
+    watch(watcher, rig, arguments.seconds)
+    report(watcher, answer, arguments)
+    cv2.imwrite(str(arguments.out / 'panorama.png'), watcher.picture())
+    print(f'Saved {arguments.out / "panorama.png"}')
 
 
 def parse() -> argparse.Namespace:
@@ -50,6 +79,13 @@ def parse() -> argparse.Namespace:
     parser.add_argument('--seconds', type=float, default=5.0, help='how long to watch')
     parser.add_argument('--rate', type=float, default=30.0, help='frames a second')
     parser.add_argument('--composed', action='store_true', help='one process instead of five')
+    parser.add_argument(
+        '--view',
+        nargs='?',
+        const='127.0.0.1',
+        metavar='HOST',
+        help='show it in a browser instead; 0.0.0.0 as HOST lets other machines look too',
+    )
     arguments = parser.parse_args()
     for side in ('left', 'right') if arguments.rig else ():
         for suffix in ('png', 'yaml'):
