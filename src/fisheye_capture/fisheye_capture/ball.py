@@ -1,15 +1,15 @@
 """The ball that bounces back and forth across bearing 0 of the synthetic world."""
 
 from dataclasses import dataclass
-from math import pi
+from math import cos, pi, radians, sin, tan
 
 import numpy as np
 
 PERIOD_NS = 6_000_000_000
 """Time in which it goes to the right, to the left and back."""
-_REACH_RAD = np.radians(40)
-_LOWEST_RAD, _BOUNCE_RAD = np.radians((-21, 15))
-_RADIUS_RAD = np.radians(6.5)
+_REACH_RAD = radians(40)
+_LOWEST_RAD, _BOUNCE_RAD = radians(-21), radians(15)
+_RADIUS_RAD = radians(6.5)
 _SEGMENTS = 5
 _RED, _WHITE = np.array([(44, 70, 190), (184, 190, 194)], np.float32)
 """BGR."""
@@ -30,14 +30,14 @@ class Ball:
     def at(cls, stamp_ns: int) -> 'Ball':
         """Give the ball at a time since the epoch."""
         phase = 2 * pi * (stamp_ns % PERIOD_NS) / PERIOD_NS
-        bearing = _REACH_RAD * np.sin(phase)
-        return cls(bearing, _LOWEST_RAD + _BOUNCE_RAD * abs(np.sin(3 * phase)), 4 * bearing)
+        bearing = _REACH_RAD * sin(phase)
+        return cls(bearing, _LOWEST_RAD + _BOUNCE_RAD * abs(sin(3 * phase)), 4 * bearing)
 
     @property
     def axes(self) -> np.ndarray:
         """Unit vectors (3, 3) to its right, down, and from the viewer through its centre."""
-        sin_b, cos_b = np.sin(self.bearing_rad), np.cos(self.bearing_rad)
-        sin_e, cos_e = np.sin(self.elevation_rad), np.cos(self.elevation_rad)
+        sin_b, cos_b = sin(self.bearing_rad), cos(self.bearing_rad)
+        sin_e, cos_e = sin(self.elevation_rad), cos(self.elevation_rad)
         right = (cos_b, 0.0, -sin_b)
         forward = (sin_b * cos_e, -sin_e, cos_b * cos_e)
         return np.array([right, np.cross(forward, right), forward])
@@ -45,7 +45,7 @@ class Ball:
     def rim(self) -> np.ndarray:
         """Give directions (N, 3) just around the ball."""
         angle = np.linspace(0, 2 * pi, 32, endpoint=False)
-        radius = np.tan(1.1 * _RADIUS_RAD)
+        radius = tan(1.1 * _RADIUS_RAD)
         local = [radius * np.cos(angle), radius * np.sin(angle), np.ones_like(angle)]
         return np.stack(local, axis=-1) @ self.axes
 
@@ -67,7 +67,7 @@ class Ball:
             (..., 1) float32, 0 to 1: how much of the pixel the ball fills.
         """
         x, y, forward = np.moveaxis(rays @ self.axes.T.astype(np.float32), -1, 0)
-        scale = np.tan(_RADIUS_RAD) * np.maximum(forward, 0.1)
+        scale = tan(_RADIUS_RAD) * np.maximum(forward, 0.1)
         x, y = x / scale, y / scale
         radius = np.hypot(x, y)
         sharpness = _RADIUS_RAD * px_per_rad / _SOFTNESS_PX

@@ -79,7 +79,11 @@ def video_pictures(path: Path, loop: bool) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def _read(path: Path) -> np.ndarray:
-    image = cv2.imread(str(path), _AS_TAKEN)
+    try:
+        image = cv2.imread(str(path), _AS_TAKEN)
+    except cv2.error:
+        # OpenCV refuses pictures that are too large this way.
+        image = None
     if image is None:
         raise SourceError(f'{path} cannot be read as a picture')
     return image
