@@ -1,5 +1,9 @@
 """Running a node as a process: start, spin, and end without a traceback."""
 
+import os
+import threading
+import traceback
+
 import rclpy
 from rclpy.exceptions import ParameterException
 from rclpy.executors import (
@@ -29,6 +33,7 @@ def run(node_class: type[Node], *, threads: int = 1) -> int:
         The exit code: 0, or 1 if the node could not start.
     """
     node = executor = None
+    threading.excepthook = _give_up
     try:
         rclpy.init()
         node = node_class()
@@ -47,3 +52,10 @@ def run(node_class: type[Node], *, threads: int = 1) -> int:
             node.destroy_node()
         rclpy.try_shutdown()
     return 0
+
+
+def _give_up(arguments) -> None:
+    """End the process when one of its threads dies of a bug: a frozen picture would look alive."""
+    text = ''.join(traceback.format_exception(arguments.exc_value))
+    get_logger('fisheye').fatal(f'the thread {arguments.thread.name} died:\n{text}')
+    os._exit(1)

@@ -1,0 +1,175 @@
+"""The undistort node over real rclpy: corrected pictures, and nonsense kept away."""
+
+import time
+
+import numpy as np
+import pytest
+import rclpy
+from fisheye_msgs.msg import Projection
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import CameraInfo, Image
+from std_msgs.msg import Header
+
+from fisheye_bridge.camera_info import camera_info_of
+from fisheye_bridge.images import to_array, to_message
+from fisheye_bridge.projection import surface_of
+from fisheye_bridge.qos import IMAGE, LATCHED
+from fisheye_geometry.camera_file import Camera
+from fisheye_geometry.lens import make_lens
+from fisheye_undistort.settings import UndistortSettings
+from fisheye_undistort.undistort_node import UndistortNode
+
+DEADLINE_S = 10.0
+LENS = make_lens('equidistant', 160, 120, [54, 0, 79.5, 0, 54, 59.5, 0, 0, 1], [0, 0, 0, 0])
+PICTURE = np.full((120, 160, 3), 200, np.uint8)
+
+
+class Bench:
+    """The node between a publisher and subscribers, spun by hand."""
+
+    def __init__(self, name, **parameters):
+        self._context = rclpy.Context()
+        rclpy.init(context=self._context)
+        overrides = [Parameter(key, value=value) for key, value in parameters.items()]
+        common = {'context': self._context, 'namespace': f'/{name}'}
+        self.node = UndistortNode(parameter_overrides=overrides, **common)
+        self._tester = rclpy.create_node('tester', **common)
+        self.pictures, self.projections, self._stamp = [], [], 0
+        self._raw = self._tester.create_publisher(Image, 'image_raw', IMAGE)
+        self._info = self._tester.create_publisher(CameraInfo, 'camera_info', IMAGE)
+        self._tester.create_subscription(Image, 'image_rect', self.pictures.append, IMAGE)
+        self._tester.create_subscription(
+            Projection, 'projection', self.projections.append, LATCHED
+        )
+        self._executor = SingleThreadedExecutor(context=self._context)
+        for node in (self.node, self._tester):
+            self._executor.add_node(node)
+
+    def send(self, picture=PICTURE, encoding='bgr8', lens=LENS, **wrong):
+        self._stamp += 1
+        header = Header(frame_id='left_optical_frame')
+        header.stamp.nanosec = self._stamp
+        if lens is not None:
+            info = camera_info_of(Camera('left', lens), header)
+            for key, value in wrong.items():
+                setattr(info, key, value)
+            self._info.publish(info)
+        message = to_message(picture, 'bgr8' if picture.ndim == 3 else 'mono8', header)
+        message.encoding = encoding
+        self._raw.publish(message)
+
+    def until(self, condition, what, **sending):
+        deadline = time.monotonic() + DEADLINE_S
+        while not condition():
+            assert time.monotonic() < deadline, what
+            self.send(**sending)
+            for _ in range(6):
+                self._executor.spin_once(timeout_sec=0.01)
+
+    def close(self):
+        self._executor.shutdown()
+        self.node.destroy_node()
+        self._tester.destroy_node()
+        rclpy.shutdown(context=self._context)
+
+
+@pytest.fixture
+def make_bench(request):
+    benches = []
+
+    def make(**parameters):
+        name = ''.join(c if c.isalnum() else '_' for c in request.node.name)
+        benches.append(Bench(name, **parameters))
+        return benches[-1]
+
+    yield make
+    for bench in benches:
+        bench.close()
+
+
+def test_pictures_are_corrected_and_their_projection_is_told(make_bench):
+    bench = make_bench()
+    bench.until(lambda: bench.pictures and bench.projections, 'a corrected picture')
+    surface = surface_of(bench.projections[-1])
+    assert surface == UndistortSettings().surface_of(LENS)
+    picture, encoding = to_array(bench.pictures[-1])
+    assert (encoding, picture.shape) == ('bgr8', (surface.height, surface.width, 3))
+    assert set(np.unique(picture)) == {0, 200}
+    assert bench.pictures[-1].header.frame_id == 'left_optical_frame'
+    assert bench.pictures[-1].header.stamp.nanosec > 0
+
+
+def test_what_is_seen_is_never_0(make_bench):
+    bench = make_bench()
+    bench.until(
+        lambda: bench.pictures,
+        'a picture',
+        picture=np.zeros((120, 160), np.uint8),
+        encoding='mono8',
+    )
+    assert set(np.unique(to_array(bench.pictures[-1])[0])) == {0, 1}
+
+
+def test_the_maps_are_rebuilt_only_for_a_real_change(make_bench):
+    bench = make_bench()
+    bench.until(lambda: len(bench.pictures) > 10, 'pictures')
+    assert len(bench.projections) == 1
+    longer = make_lens('equidistant', 160, 120, [60, 0, 79.5, 0, 60, 59.5, 0, 0, 1], [0] * 4)
+    bench.until(lambda: len(bench.projections) == 2, 'another projection', lens=longer)
+    assert bench.projections[-1].focal_px == 60
+
+
+@pytest.mark.parametrize(
+    'wrong',
+    [
+        {'k': [0.0] * 9},
+        {'k': [float('nan')] * 9},
+        {'distortion_model': 'unheard_of'},
+        {'d': [0.1, 0.2]},
+        {'width': 0},
+        {'binning_x': 4},
+    ],
+)
+def test_a_nonsense_camera_info_leaves_the_good_one_in_use(make_bench, wrong):
+    bench = make_bench()
+    bench.until(lambda: bench.pictures, 'a picture')
+    bench.pictures.clear()
+    bench.until(lambda: len(bench.pictures) > 3, 'pictures still', **wrong)
+    assert len(bench.projections) == 1
+
+
+def test_unusable_pictures_are_dropped_and_counted(make_bench):
+    bench = make_bench()
+    bench.until(lambda: bench.pictures, 'a picture')
+    small = np.zeros((12, 16, 3), np.uint8)
+    for sending in ({'encoding': 'mono16'}, {'picture': small}, {'encoding': 'bgra8'}):
+        refused = bench.node._input.refused
+        bench.until(
+            lambda before=refused: bench.node._input.refused > before, 'refusal', **sending
+        )
+    count = len(bench.pictures)
+    bench.until(lambda: len(bench.pictures) > count, 'a picture again')
+
+
+def test_live_parameters_apply_and_impossible_ones_are_refused(make_bench):
+    bench = make_bench()
+    bench.until(lambda: bench.pictures, 'a picture')
+
+    def change(**values):
+        return bench.node.set_parameters([Parameter(k, value=v) for k, v in values.items()])[0]
+
+    assert change(scale='fit').successful
+    bench.until(lambda: bench.pictures[-1].width == 160, 'the picture at its own size')
+    refused = change(surface='spherical')
+    assert (refused.successful, 'expected one of cylindrical' in refused.reason) == (False, True)
+    assert change(surface='rectilinear', hfov_deg=100).successful
+    refused = change(hfov_deg=175.0)
+    assert 'holds less than 170 degrees; 175 were asked' in refused.reason
+
+
+def test_the_parameters_are_taken_at_start(make_bench):
+    bench = make_bench(surface='equirectangular', interpolation='nearest', hfov_deg=100)
+    bench.until(lambda: bench.projections, 'a projection')
+    assert bench.projections[0].surface == 'equirectangular'
+    assert bench.projections[0].width == round(np.radians(100) * 54)
