@@ -73,12 +73,14 @@ class Grabber:
     @property
     def note(self) -> str:
         """What a user should know of how the source was opened."""
-        return self._source.note if self._source else ''
+        source = self._source  # The reading thread may lose it at any moment.
+        return source.note if source else ''
 
     @property
     def skipped(self) -> int:
         """Frames of the open source that were due while the one before was still in work."""
-        return self._source.skipped if self._source else 0
+        source = self._source
+        return source.skipped if source else 0
 
     @property
     def rate_hz(self) -> float:
