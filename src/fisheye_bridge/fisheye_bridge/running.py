@@ -1,20 +1,21 @@
 """Running a node as a process: start, spin, and end without a traceback."""
 
 import os
+import signal
 import threading
 import traceback
 
 import rclpy
 from rclpy.exceptions import ParameterException
-from rclpy.executors import (
-    ExternalShutdownException,
-    MultiThreadedExecutor,
-    SingleThreadedExecutor,
-)
+from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.logging import get_logger
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 
 from fisheye_geometry.errors import FisheyeError
+
+_LONGEST_WAIT_S = 0.2
+"""A signal is noticed after so long at the latest."""
 
 
 def run(node_class: type[Node], *, threads: int = 1) -> int:
@@ -34,14 +35,17 @@ def run(node_class: type[Node], *, threads: int = 1) -> int:
     """
     node = executor = None
     threading.excepthook = _give_up
+    ended = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: ended.set())
     try:
-        rclpy.init()
+        # rclpy's own handlers would end the context while threads of the node still publish.
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         node = node_class()
         executor = MultiThreadedExecutor(threads) if threads > 1 else SingleThreadedExecutor()
         executor.add_node(node)
-        executor.spin()
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
+        while not ended.is_set():
+            executor.spin_once(timeout_sec=_LONGEST_WAIT_S)
     except (FisheyeError, ParameterException, rclpy._rclpy_pybind11.RCLError) as error:
         get_logger(node_class.__name__).fatal(str(error))
         return 1
