@@ -1,0 +1,171 @@
+"""Put circles into the order of a printed grid, however strongly the lens bends it."""
+
+from heapq import heappop, heappush
+
+import numpy as np
+
+from fisheye_geometry.errors import CalibrationError
+from fisheye_undistort.circle_grid import Circles
+from fisheye_undistort.target import Target
+
+_TOLERANCE = 0.3
+"""How far a neighbour may lie from where it is expected, as a share of the smallest step."""
+_MIN_SHARE = 0.9
+"""Fewer circles than this share of the grid are not taken for the grid."""
+_SEEDS = 3
+"""How often a circle is reached before it is no start any more: a start may be a stray."""
+
+
+def order_grid(circles: Circles, target: Target) -> tuple[np.ndarray, np.ndarray]:
+    """Find the grid among circles and tell which point of the target each circle is.
+
+    A circle's image tells how the print is stretched at its place (a Jacobian but for a rotation),
+    so each circle knows where its neighbours must be, and they in turn know theirs: no line needs
+    to be straight.
+
+    Returns
+    -------
+    points_px : ndarray
+        (M, 2) centres of mass of the grid's circles.
+    ids : ndarray
+        (M,) int, rows of `target.points_mm`; a few circles may be missing.
+
+    Raises
+    ------
+    CalibrationError
+        If there is no such grid.
+    """
+    neighbourhood = _Neighbourhood(circles, target)
+    best, largest = None, {}
+    visits = np.zeros(len(circles), int)
+    for seed in range(len(circles)):
+        if visits[seed] == _SEEDS:
+            continue
+        grown = [neighbourhood.grow(seed, start) for start in neighbourhood.hypotheses(seed)]
+        for cells, mismatch in grown:
+            largest = max(largest, cells, key=len)
+            matched = _match(cells, target)
+            rank = (len(matched), -mismatch) if matched else (0, 0.0)
+            if matched and (best is None or rank > best[0]):
+                best = rank, matched
+        visits[list({circle for cells, _ in grown for circle in cells})] += 1
+    if best is None:
+        raise CalibrationError(_what_is_there(circles, largest, target))
+    ids = np.array(sorted(best[1]))
+    return circles.centers[[best[1][i] for i in ids]], ids
+
+
+class _Neighbourhood:
+    """Local stretch of the print at each circle, and the steps to its neighbours."""
+
+    def __init__(self, circles: Circles, target: Target):
+        self._centers = circles.centers
+        values, vectors = np.linalg.eigh(circles.shapes)
+        scale = 2 * np.sqrt(values) / target.radius_mm
+        self._stretch = (vectors * scale[:, None, :]) @ vectors.transpose(0, 2, 1)
+        self._shrink = np.linalg.inv(self._stretch)
+        spacing = np.array([target.dx_mm, target.dy_mm])
+        steps = np.array(target.steps)
+        self._steps = [(tuple(step), step * spacing) for step in np.concatenate([steps, -steps])]
+        lengths = np.linalg.norm(steps * spacing, axis=1)
+        self._limit_mm = _TOLERANCE * lengths.min()
+        self._reach_mm = lengths.max() + self._limit_mm
+
+    def hypotheses(self, seed: int):
+        """Jacobians (2, 2), px/mm: the nearest circle may be reached by any of the steps."""
+        near = self._near(seed)
+        if not len(near):
+            return
+        offsets = self._offsets_mm(seed, near, self._stretch[seed], self._stretch[near])
+        offset = offsets[np.argmin(np.hypot(*offsets.T))]
+        for _, step_mm in self._steps:
+            if abs(np.hypot(*offset) - np.hypot(*step_mm)) < self._limit_mm:
+                yield self._stretch[seed] @ _rotations(_angle(offset) - _angle(step_mm))
+
+    def grow(self, seed: int, jacobian: np.ndarray) -> tuple[dict[int, tuple], float]:
+        """Walk from neighbour to neighbour, the surest step first.
+
+        Returns
+        -------
+        cells : dict
+            Column and row, counted from the seed, of each circle that was reached.
+        mismatch_mm : float
+            Mean distance of the circles from where the steps led.
+        """
+        cells, misses, steps = {}, [], []
+        circle, cell, miss = seed, (0, 0), 0.0
+        while True:
+            if circle not in cells and cell not in cells.values():
+                cells[circle] = cell
+                misses.append(miss)
+                for step in self._steps_from(circle, cell, jacobian):
+                    heappush(steps, step)
+            if not steps:
+                return cells, float(np.mean(misses))
+            miss, circle, cell, jacobian = heappop(steps)
+
+    def _steps_from(self, at: int, cell: tuple, jacobian: np.ndarray):
+        """Steps to the neighbours of a circle: mismatch, circle, cell, and the Jacobian there."""
+        near = self._near(at)
+        there = self._carry(jacobian, near)
+        offsets = self._offsets_mm(at, near, jacobian, there)
+        for step, step_mm in self._steps:
+            misses = np.hypot(*(offsets - step_mm).T)
+            following = (cell[0] + step[0], cell[1] + step[1])
+            for i in np.flatnonzero(misses < self._limit_mm):
+                # Where the step really led tells how far the turn has drifted on the way here.
+                corrected = there[i] @ _rotations(_angle(offsets[i]) - _angle(step_mm))
+                yield float(misses[i]), int(near[i]), following, corrected
+
+    def _near(self, at: int) -> np.ndarray:
+        """Circles within reach of one step."""
+        offsets = (self._centers - self._centers[at]) @ self._shrink[at]
+        distance = np.hypot(*offsets.T)
+        # The print shrinks towards the picture's edge: what is far here may be near from there.
+        return np.flatnonzero((distance > 0) & (distance < 2 * self._reach_mm))
+
+    def _carry(self, jacobian: np.ndarray, others: np.ndarray) -> np.ndarray:
+        """Jacobians (K, 2, 2) of other circles: their own stretch, turned as little as can be."""
+        change = self._shrink[others] @ jacobian
+        turn = np.arctan2(change[:, 1, 0] - change[:, 0, 1], change[:, 0, 0] + change[:, 1, 1])
+        return self._stretch[others] @ _rotations(turn)
+
+    def _offsets_mm(self, at: int, others: np.ndarray, jacobian, there) -> np.ndarray:
+        """Offsets (K, 2) on the sheet; the mean Jacobian of both ends is right to second order."""
+        offsets_px = (self._centers[others] - self._centers[at])[..., None]
+        return np.linalg.solve((jacobian + there) / 2, offsets_px)[..., 0]
+
+
+def _angle(vector: np.ndarray) -> float:
+    return np.arctan2(vector[1], vector[0])
+
+
+def _rotations(angle) -> np.ndarray:
+    """Rotations (..., 2, 2) by angles (...), rad."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack([np.stack([c, -s], axis=-1), np.stack([s, c], axis=-1)], axis=-2)
+
+
+def _match(cells: dict[int, tuple], target: Target) -> dict[int, int] | None:
+    """Shift cells onto the target; its ids to circles, or None if it is another grid."""
+    ids = {tuple(cell): i for i, cell in enumerate(target.cells.tolist())}
+    fits = []
+    origin = next(iter(cells.values()))
+    for cell in ids:
+        shift = (cell[0] - origin[0], cell[1] - origin[1])
+        moved = {(x + shift[0], y + shift[1]): circle for circle, (x, y) in cells.items()}
+        fits.append({ids[c]: circle for c, circle in moved.items() if c in ids})
+    most = max(map(len, fits))
+    # A dark thing beside the sheet may pass for a neighbour; where circles are missing too, the
+    # whole order is in doubt.
+    sure = most == len(ids) or 2 * most - len(cells) >= _MIN_SHARE * len(ids)
+    ambiguous = sum(len(fit) == most for fit in fits) > 1
+    return max(fits, key=len) if sure and not ambiguous else None
+
+
+def _what_is_there(circles: Circles, cells: dict[int, tuple], target: Target) -> str:
+    wanted = f'expected {target.rows} rows and {target.columns} columns'
+    if len(cells) < 4:
+        return f'no grid among {len(circles)} dark round particles; {wanted}'
+    columns, rows = np.ptp(np.array(list(cells.values())), axis=0) + 1
+    return f'a grid of {len(cells)} circles, {rows} x {columns} (rows x columns), found; {wanted}'

@@ -1,0 +1,156 @@
+"""Print a calibration target true to scale, with its dimensions and a ruler on the sheet."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Rectangle
+
+from fisheye_geometry.errors import SettingError
+from fisheye_undistort.target import MARKERS, Target
+
+FORMATS = ('.pdf', '.svg', '.png')
+
+_PAPERS_MM = {
+    'A4': (210, 297), 'A3': (297, 420), 'A2': (420, 594), 'A1': (594, 841), 'A0': (841, 1189),
+}
+_MARGIN_MM = 8.0
+"""What printers leave white, and what a pattern needs around it."""
+_STRIP_MM = 14.0
+"""Room for the ruler and the text, left of the pattern."""
+_RULER_MM = 100
+_MM_PER_INCH = 25.4
+_POINTS_PER_MM = 72 / _MM_PER_INCH
+
+
+def write_sheet(path: str | Path, target: Target) -> str:
+    """Write a target as PDF, SVG or PNG, true to scale, and give the name of its paper.
+
+    Raises
+    ------
+    SettingError
+        For another suffix than those of `FORMATS`, a target that fits no paper, or a file that
+        cannot be written.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in FORMATS:
+        raise SettingError(f"a sheet '{path.name}' cannot be written; "
+                           f'expected a name that ends in {", ".join(FORMATS)}')
+    paper, size_mm = paper_for(target)
+    try:
+        _draw(target, paper, size_mm).savefig(path, dpi=300)
+    except OSError as error:
+        raise SettingError(f'{path} cannot be written: {error.strerror}') from error
+    return paper
+
+
+def sheet_picture(target: Target, px_per_mm: float) -> tuple[np.ndarray, np.ndarray]:
+    """Give the sheet as a picture.
+
+    Returns
+    -------
+    picture : ndarray
+        (height, width) uint8.
+    origin_px : ndarray
+        (2,) where the origin of the target's frame lies, px.
+    """
+    paper, (width, height) = paper_for(target)
+    figure = _draw(target, paper, (width, height))
+    figure.set_dpi(px_per_mm * _MM_PER_INCH)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    picture = cv2.cvtColor(np.asarray(canvas.buffer_rgba()), cv2.COLOR_RGBA2GRAY)
+    # Picture borders lie half a pixel before the first pixel's centre.
+    return picture, np.array([(width + _STRIP_MM) / 2, height / 2]) * px_per_mm - 0.5
+
+
+def paper_for(target: Target) -> tuple[str, tuple[float, float]]:
+    """Name and (width, height) in mm of the smallest A paper that holds the sheet.
+
+    Raises
+    ------
+    SettingError
+        If even A0 is too small.
+    """
+    width, height = _pattern_size(target) + 2 * _MARGIN_MM + (_STRIP_MM, 0.0)
+    height = max(height, _RULER_MM + 2 * _MARGIN_MM)
+    for name, (short, long) in _PAPERS_MM.items():
+        for size in ((long, short), (short, long)):
+            if width <= size[0] and height <= size[1]:
+                return name, size
+    raise SettingError(f'the target takes {width:.0f} x {height:.0f} mm; A0 is the largest paper')
+
+
+def _pattern_size(target: Target) -> np.ndarray:
+    """Width and height of what is printed dark, mm."""
+    border = 2 * (target.radius_mm if target.has_circles else target.dx_mm)
+    return np.ptp(target.points_mm[:, :2], axis=0) + border
+
+
+def _draw(target: Target, paper: str, size_mm: tuple[float, float]) -> Figure:
+    """Draw the page on axes whose unit is 1 mm; the origin is the target's."""
+    width, height = size_mm
+    figure = Figure(figsize=(width / _MM_PER_INCH, height / _MM_PER_INCH))
+    axes = figure.add_axes((0, 0, 1, 1))
+    axes.set_axis_off()
+    left = -(width + _STRIP_MM) / 2
+    axes.set(xlim=(left, left + width), ylim=(height / 2, -height / 2))
+    for shape in _circles(target) if target.has_circles else _squares(target):
+        axes.add_patch(shape)
+    edge = left + _MARGIN_MM
+    _ruler(axes, edge)
+    text = f'{target}. Paper {paper}: print at 100 % ("actual size") and check the ruler.'
+    axes.text(edge + 6, 0, text, rotation=90, ha='left', va='center', fontsize=8)
+    return figure
+
+
+def _circles(target: Target):
+    return [Circle(point, target.radius_mm, color='black', lw=0) for point in target.points_mm[:, :2]]
+
+
+def _squares(target: Target):
+    """Dark squares of a chessboard, and the markers in the white ones of a ChArUco board."""
+    side = target.dx_mm
+    rows, columns = (n + (target.kind == 'chessboard') for n in (target.rows, target.columns))
+    corner = -np.array([columns, rows]) * side / 2
+    markers = _marker_bits(target)
+    for row, column in np.ndindex(rows, columns):
+        x, y = corner + np.array([column, row]) * side
+        if (row + column) % 2 == 0:
+            yield Rectangle((x, y), side, side, color='black', lw=0)
+        elif markers:
+            yield from _marker(next(markers), x + side / 2, y + side / 2, target.marker_mm)
+
+
+def _marker_bits(target: Target):
+    """Black cells of one marker after another, (n, n) bool each; None on a chessboard."""
+    if target.kind != 'charuco':
+        return None
+    dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, MARKERS))
+    side = dictionary.markerSize
+    unpack = cv2.aruco.Dictionary_getBitsFromByteList
+    return (
+        np.pad(unpack(code[None], side) == 0, 1, constant_values=True)
+        for code in dictionary.bytesList
+    )
+
+
+def _marker(black: np.ndarray, x: float, y: float, size: float):
+    cell = size / len(black)
+    for row, column in np.argwhere(black):
+        corner = (x - size / 2 + column * cell, y - size / 2 + row * cell)
+        # The thin outline closes the hairlines that viewers leave between neighbours.
+        yield Rectangle(corner, cell, cell, color='black', lw=0.05 * _POINTS_PER_MM)
+
+
+def _ruler(axes, x: float) -> None:
+    """Draw a vertical ruler that tells whether the printer kept the scale."""
+    thin = 0.2 * _POINTS_PER_MM
+    start = -_RULER_MM / 2
+    axes.plot([x, x], [start, -start], color='black', lw=thin)
+    for mm in range(_RULER_MM + 1):
+        length = 4 if mm % 10 == 0 else 2.5 if mm % 5 == 0 else 1.5
+        axes.plot([x, x + length], [start + mm] * 2, color='black', lw=thin)
+    axes.text(x, start - 1, f'{_RULER_MM} mm', rotation=90, fontsize=7, ha='left', va='bottom')
