@@ -1,10 +1,12 @@
 """Shows the panorama in a browser."""
 
 from concurrent.futures import Future
+from math import isfinite
 from time import monotonic
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from fisheye_msgs.msg import Overlaps, Projection
+from fisheye_msgs.msg import Overlap, Overlaps, Projection
 from fisheye_msgs.srv import CalibrateOverlap
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
@@ -19,7 +21,7 @@ from fisheye_bridge.running import run
 from fisheye_geometry.errors import FisheyeError, OverlapError
 from panorama_stitch.viewer_server import ViewerServer
 from panorama_stitch.viewer_settings import ViewerSettings
-from panorama_stitch.viewer_status import ViewerStatus
+from panorama_stitch.viewer_status import ViewerStatus, measured
 
 _TELL_S = 0.5
 
@@ -47,7 +49,12 @@ class ViewerNode(Node):
         # The page goes on while a recording, and with it the time of ROS, stands still.
         self.create_timer(_TELL_S, self._tell, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._diagnostics = Diagnostics(self, self._report)
-        self.get_logger().info(f'the panorama is at {self._server.url}')
+        self.get_logger().info(f'the panorama is at {self.url}')
+
+    @property
+    def url(self) -> str:
+        """What to open in a browser."""
+        return self._server.url
 
     def destroy_node(self) -> None:
         """Say goodbye to the browsers too."""
@@ -78,17 +85,7 @@ class ViewerNode(Node):
         self._server.tell(projection=vars(surface))
 
     def _take_overlaps(self, message) -> None:
-        self._server.tell(
-            overlaps=[
-                {
-                    'left': overlap.left_camera,
-                    'right': overlap.right_camera,
-                    'found': overlap.found,
-                    'confidence': overlap.confidence,
-                }
-                for overlap in message.overlaps
-            ]
-        )
+        self._server.tell(overlaps=[_entry(overlap) for overlap in message.overlaps])
 
     def _take_diagnostics(self, message) -> None:
         """Keep what the nodes of this rig report: those in the viewer's namespace."""
@@ -117,13 +114,30 @@ class ViewerNode(Node):
 
         def say(done):
             if said.set_running_or_notify_cancel():
-                said.set_result(done.result().message)
+                said.set_result(_sentence(done.result()))
 
         asked.add_done_callback(say)
         return said
 
     def _report(self, report) -> None:
         report.values['browsers'] = self._server.watchers
+
+
+def _entry(overlap: Overlap) -> dict[str, Any]:
+    """Give what the page shows of an overlap; JSON has no NaN."""
+    numbers = {'confidence': overlap.confidence, 'offset_deg': overlap.offset_deg}
+    return {
+        'left': overlap.left_camera,
+        'right': overlap.right_camera,
+        'found': overlap.found,
+        **{name: value if isfinite(value) else None for name, value in numbers.items()},
+    }
+
+
+def _sentence(response: CalibrateOverlap.Response) -> str:
+    if not response.success:
+        return response.message
+    return '; '.join(measured(_entry(overlap)) for overlap in response.overlaps)
 
 
 def main() -> int:

@@ -1,6 +1,7 @@
 """The state of the rig in plain words, for people who do not know its parts."""
 
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isfinite
 from statistics import median
@@ -98,3 +99,12 @@ def plain(name: str) -> str:
     camera, _, role = name.rpartition('/')
     words = _ROLES[role].format(camera).replace('  ', ' ').strip()
     return words[:1].upper() + words[1:]
+
+
+def measured(overlap: Mapping[str, Any]) -> str:
+    """Say what a calibration found for a pair of cameras."""
+    pair = '{left} and {right}'.format(**overlap)
+    if not overlap['found']:
+        return f'{pair} show nothing in common'
+    apart = f', {overlap["offset_deg"]:.1f}° apart' if overlap['offset_deg'] is not None else ''
+    return f'{pair} overlap{apart} (confidence {overlap["confidence"]:.2f})'

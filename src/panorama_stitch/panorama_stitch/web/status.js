@@ -84,4 +84,4 @@ function delay(ms) {
   return ms < 1000 ? `${Math.max(ms, 0).toFixed(0)} ms` : length(ms / 1000);
 }
 
-const confidence = ({ found, confidence: value }) => (found ? value.toFixed(2) : 'none');
+const confidence = ({ found, confidence: value }) => (found ? value?.toFixed(2) ?? '?' : 'none');

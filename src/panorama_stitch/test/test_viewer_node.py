@@ -1,0 +1,209 @@
+"""The viewer node in this process, with a node beside it in the place of the stitching."""
+
+import asyncio
+import json
+import threading
+import time
+from array import array
+from math import nan
+
+import aiohttp
+import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from fisheye_msgs.msg import Overlap, Overlaps, Projection
+from fisheye_msgs.srv import CalibrateOverlap
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import CompressedImage
+
+from fisheye_bridge.qos import IMAGE, LATCHED
+from fisheye_geometry.errors import SettingError
+from panorama_stitch.viewer_node import ViewerNode
+
+DEADLINE_S = 15.0
+JPEG = b'\xff\xd8 as it is \xff\xd9'
+
+
+class Stitching(Node):
+    """Publishes what the stitch node would, in the namespace /rig."""
+
+    def __init__(self, context):
+        super().__init__('stitch', context=context, namespace='/rig')
+        self.image = self.create_publisher(CompressedImage, 'panorama/image/compressed', IMAGE)
+        self.projection = self.create_publisher(Projection, 'panorama/projection', LATCHED)
+        self.overlap = self.create_publisher(Overlaps, 'panorama/overlap', LATCHED)
+        self.diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self.create_timer(0.05, self.publish)
+
+    def publish(self):
+        message = CompressedImage(format='bgr8; jpeg compressed bgr8', data=array('B', JPEG))
+        message.header.stamp = self.get_clock().now().to_msg()
+        self.image.publish(message)
+        skew = [KeyValue(key='skew median ms', value='2.5')]
+        self.diagnostics.publish(
+            DiagnosticArray(
+                status=[
+                    DiagnosticStatus(name='rig/left/capture', level=b'\2', message='unplugged'),
+                    DiagnosticStatus(name='other/left/capture', level=b'\2', message='not ours'),
+                    DiagnosticStatus(name='rig/stitch', values=skew),
+                ]
+            )
+        )
+
+
+@pytest.fixture
+def ros():
+    """Give a context whose nodes, once added to the executor, spin in a thread."""
+
+    class Ros:
+        context = rclpy.Context()
+        nodes = ()
+
+        def __init__(self):
+            rclpy.init(context=self.context)
+            self.executor = SingleThreadedExecutor(context=self.context)
+            self.is_done = False
+            self.thread = threading.Thread(target=self.spin)
+
+        def start(self, *nodes):
+            self.nodes = nodes
+            for node in nodes:
+                self.executor.add_node(node)
+            self.thread.start()
+
+        def spin(self):
+            while not self.is_done:
+                self.executor.spin_once(timeout_sec=0.05)
+
+        def stop(self):
+            self.is_done = True
+            if self.nodes:
+                self.thread.join()
+            for node in self.nodes:
+                node.destroy_node()
+            self.executor.shutdown()
+            rclpy.shutdown(context=self.context)
+
+    ros = Ros()
+    yield ros
+    ros.stop()
+
+
+def viewer(ros, **parameters):
+    return ViewerNode(
+        context=ros.context,
+        namespace='/rig',
+        parameter_overrides=[Parameter(name, value=v) for name, v in parameters.items()],
+    )
+
+
+def wait_for(condition):
+    deadline = time.monotonic() + DEADLINE_S
+    while not condition():
+        assert time.monotonic() < deadline, 'it did not happen'
+        time.sleep(0.01)
+
+
+def visit(scenario):
+    async def run():
+        async with aiohttp.ClientSession() as session:
+            return await asyncio.wait_for(scenario(session), DEADLINE_S)
+
+    return asyncio.run(run())
+
+
+def test_pictures_go_to_the_browser_as_they_are_and_only_while_one_looks(ros):
+    stitching, node = Stitching(ros.context), viewer(ros, port=0)
+    ros.start(stitching, node)
+    wait_for(lambda: stitching.projection.get_subscription_count())
+    assert not stitching.image.get_subscription_count()
+
+    async def look(session):
+        async with session.ws_connect(f'{node.url}live') as stream:
+            async for message in stream:
+                if message.type is aiohttp.WSMsgType.BINARY:
+                    return message.data
+
+    assert visit(look) == JPEG
+    wait_for(lambda: not stitching.image.get_subscription_count())
+    assert visit(look) == JPEG
+
+
+def test_the_page_is_told_what_the_rig_says(ros):
+    stitching, node = Stitching(ros.context), viewer(ros, port=0)
+    stitching.projection.publish(
+        Projection(surface='cylindrical', width=800, height=300, focal_px=160.0, center_x_px=399.5)
+    )
+    overlaps = [
+        Overlap(left_camera='left', right_camera='right', found=True, confidence=confidence)
+        for confidence in (0.9, nan)
+    ]
+    stitching.overlap.publish(Overlaps(overlaps=overlaps))
+    ros.start(stitching, node)
+
+    async def hear(session):
+        async with session.ws_connect(f'{node.url}live') as stream:
+            async for message in stream:
+                if message.type is not aiohttp.WSMsgType.TEXT:
+                    await stream.send_str('drawn')
+                    continue
+                told = json.loads(message.data)
+                if all(told.get(key) for key in ('projection', 'overlaps', 'problems', 'rate_hz')):
+                    return told
+
+    told = visit(hear)
+    assert told['projection']['kind'] == 'cylindrical'
+    assert told['projection']['focal_px'] == 160.0
+    # JSON has no NaN, and a browser would refuse it.
+    assert [overlap['confidence'] for overlap in told['overlaps']] == [0.9, None]
+    assert [problem['text'] for problem in told['problems']] == ['Left camera: unplugged']
+    assert told['skew_ms'] == 2.5
+    assert 0 <= told['delay_ms'] < 1000 * DEADLINE_S
+
+
+def press_calibrate(node):
+    async def press(session):
+        async with session.post(f'{node.url}calibrate') as reply:
+            return reply.status, await reply.text()
+
+    return visit(press)
+
+
+def test_the_button_has_the_overlap_measured(ros):
+    stitching, node = Stitching(ros.context), viewer(ros, port=0)
+
+    def calibrate(request, response):
+        response.success = request.method == ''
+        response.overlaps = [
+            Overlap(
+                left_camera='left',
+                right_camera='right',
+                found=True,
+                offset_deg=140.2,
+                confidence=0.9,
+            )
+        ]
+        return response
+
+    stitching.create_service(CalibrateOverlap, 'calibrate_overlap', calibrate)
+    ros.start(stitching, node)
+    words = 'left and right overlap, 140.2° apart (confidence 0.90)'
+    wait_for(lambda: press_calibrate(node) == (200, words))
+
+
+def test_the_button_says_so_where_nobody_measures(ros):
+    node = viewer(ros, port=0)
+    ros.start(node)
+    status, words = press_calibrate(node)
+    assert status == 503
+    assert 'nobody offers calibrate_overlap' in words
+
+
+def test_a_port_that_cannot_be_had_is_a_sentence(ros):
+    first = viewer(ros, port=0)
+    ros.start(first)
+    port = int(first.url.split(':')[2].strip('/'))
+    with pytest.raises(SettingError, match='in use by another program'):
+        viewer(ros, port=port)

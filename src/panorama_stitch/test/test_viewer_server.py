@@ -1,0 +1,297 @@
+import asyncio
+import json
+import re
+import socket
+import time
+from concurrent.futures import Future
+from pathlib import Path
+
+import aiohttp
+import pytest
+
+import panorama_stitch
+from fisheye_geometry.errors import OverlapError, SettingError
+from panorama_stitch.viewer_server import ViewerServer
+from panorama_stitch.viewer_settings import ViewerSettings
+
+DEADLINE_S = 10.0
+WEB = Path(panorama_stitch.__file__).parent / 'web'
+
+
+def answered(sentence):
+    future = Future()
+    future.set_result(sentence)
+    return future
+
+
+@pytest.fixture
+def serve():
+    servers = []
+
+    def start(calibrate=lambda: answered('measured'), watched=lambda: None, **settings):
+        settings = ViewerSettings(**{'port': 0, 'stale_after_s': 60.0, **settings})
+        server = ViewerServer(settings, calibrate=calibrate, watched=watched)
+        servers.append(server)
+        server.start()
+        return server
+
+    yield start
+    for server in servers:
+        server.stop()
+
+
+def visit(scenario):
+    """Run a coroutine that takes a client session."""
+
+    async def run():
+        async with aiohttp.ClientSession() as session:
+            return await asyncio.wait_for(scenario(session), DEADLINE_S)
+
+    return asyncio.run(run())
+
+
+def address(server, path=''):
+    return server.url.partition('#')[0] + path
+
+
+def request(method, url, **arguments):
+    async def scenario(session):
+        async with session.request(method, url, **arguments) as reply:
+            return reply.status, await reply.read(), reply.headers
+
+    return visit(scenario)
+
+
+async def picture(stream):
+    """Skip the states before the next picture."""
+    while True:
+        message = await stream.receive()
+        if message.type is aiohttp.WSMsgType.BINARY:
+            return message.data
+        assert message.type is aiohttp.WSMsgType.TEXT, message
+
+
+async def state(stream, condition):
+    while not condition(told := json.loads((await stream.receive()).data)):
+        pass
+    return told
+
+
+def wait_for(condition):
+    deadline = time.monotonic() + DEADLINE_S
+    while not condition():
+        assert time.monotonic() < deadline, 'it did not happen'
+        time.sleep(0.01)
+
+
+def test_the_page_is_there_and_needs_nothing_from_elsewhere(serve):
+    server = serve()
+    for name in ('', *(path.name for path in WEB.iterdir())):
+        status, body, headers = request('GET', address(server, name))
+        assert status == 200
+        assert "default-src 'self'" in headers['Content-Security-Policy']
+        assert headers['X-Content-Type-Options'] == 'nosniff'
+        links = re.findall(rb'https?://[^"\s]+', body)
+        assert set(links) <= {b'http://www.w3.org/2000/svg'}
+
+
+@pytest.mark.parametrize(
+    'path',
+    [
+        'viewer_node.py',
+        '..%2fviewer_node.py',
+        '%2e%2e/viewer_node.py',
+        '/etc/passwd',
+        'web/main.js',
+    ],
+)
+def test_no_other_file_can_be_had(serve, path):
+    from yarl import URL
+
+    status, _, _ = request('GET', URL(address(serve(), path), encoded=True))
+    assert status == 404
+
+
+@pytest.mark.parametrize(
+    ('headers', 'status'),
+    [
+        ({'Host': 'elsewhere.example'}, 403),
+        ({'Host': 'elsewhere.example:8080'}, 403),
+        ({'Host': '192.0.2.7:8080'}, 200),
+        ({'Host': 'localhost:9000'}, 200),
+        ({'Host': '[::1]:8080'}, 200),
+        ({'Host': 'localhost', 'Origin': 'http://elsewhere.example'}, 403),
+        ({'Host': 'localhost', 'Origin': 'null'}, 403),
+        ({'Host': 'localhost:80', 'Origin': 'http://localhost:80'}, 200),
+    ],
+)
+def test_other_sites_are_refused(serve, headers, status):
+    server = serve()
+    for method, path in (('GET', ''), ('POST', 'calibrate')):
+        assert request(method, address(server, path), headers=headers)[0] == status
+
+    async def look(session):
+        async with session.ws_connect(address(server, 'live'), headers=headers):
+            return 101
+
+    if status == 403:
+        with pytest.raises(aiohttp.WSServerHandshakeError):
+            visit(look)
+
+
+def test_a_slow_browser_gets_fewer_pictures_and_no_old_one(serve):
+    server = serve()
+
+    async def scenario(session):
+        async with session.ws_connect(address(server, 'live')) as stream:
+            await state(stream, lambda _: True)
+            server.show(b'first')
+            assert await picture(stream) == b'first'
+            server.show(b'overtaken')
+            server.show(b'newest')
+            server.tell(mark=1)
+            # What was sent before this state would have come before it.
+            await state(stream, lambda told: told.get('mark') == 1)
+            await stream.send_str('drawn')
+            assert await picture(stream) == b'newest'
+
+    visit(scenario)
+
+
+def test_a_fast_browser_does_not_wait_for_a_slow_one(serve):
+    server = serve()
+
+    async def scenario(session):
+        async with (
+            session.ws_connect(address(server, 'live')) as slow,
+            session.ws_connect(address(server, 'live')) as fast,
+        ):
+            await state(slow, lambda _: True)
+            await state(fast, lambda _: True)
+            for number in range(5):
+                server.show(b'%d' % number)
+                assert await picture(fast) == b'%d' % number
+                await fast.send_str('drawn')
+            assert await picture(slow) == b'0'
+
+    visit(scenario)
+
+
+def test_a_stale_picture_is_shown_to_nobody_new(serve):
+    server = serve(stale_after_s=0.1)
+
+    async def scenario(session):
+        async with session.ws_connect(address(server, 'live')) as first:
+            await state(first, lambda _: True)
+            server.show(b'old')
+            assert await picture(first) == b'old'
+            status = 200
+            while status != 503:
+                async with session.post(address(server, 'snapshot')) as reply:
+                    status = reply.status
+            async with session.ws_connect(address(server, 'live')) as second:
+                await state(second, lambda _: True)
+                server.show(b'new')
+                assert await picture(second) == b'new'
+
+    visit(scenario)
+
+
+def test_the_first_browser_and_the_last_are_reported(serve):
+    reports = []
+    server = serve(watched=lambda: reports.append(server.watchers))
+
+    async def scenario(session):
+        async with (
+            session.ws_connect(address(server, 'live')) as first,
+            session.ws_connect(address(server, 'live')) as second,
+        ):
+            await state(first, lambda _: True)
+            await state(second, lambda _: True)
+
+    visit(scenario)
+    wait_for(lambda: server.watchers == 0)
+    assert reports == [1, 0]
+
+
+def test_the_number_of_browsers_is_bounded(serve):
+    server = serve(max_clients=1)
+
+    async def scenario(session):
+        async with session.ws_connect(address(server, 'live')) as first:
+            await state(first, lambda _: True)
+            async with session.ws_connect(address(server, 'live')) as second:
+                message = await second.receive()
+                assert message.type is aiohttp.WSMsgType.CLOSE
+                assert 'the limit' in message.extra
+
+    visit(scenario)
+
+
+@pytest.mark.parametrize('words', ['what', 'x' * 100_000])
+def test_who_says_something_else_is_shown_out(serve, words):
+    server = serve()
+
+    async def scenario(session):
+        async with session.ws_connect(address(server, 'live')) as stream:
+            await stream.send_str(words)
+            async for _ in stream:
+                pass
+            assert stream.closed
+
+    visit(scenario)
+
+
+def test_only_who_knows_the_token_may_press_buttons_from_elsewhere(serve):
+    pressed = []
+    server = serve(lambda: pressed.append(1) or answered('measured'), host='0.0.0.0')
+    token = server.url.partition('#token=')[2]
+    here = f'http://127.0.0.1:{server.url.split(":")[2].split("/")[0]}/'
+    assert token
+    for button in ('calibrate', 'snapshot'):
+        for headers in ({}, {'X-Token': 'guess'}, {'X-Token': ''}):
+            status, words, _ = request('POST', here + button, headers=headers)
+            assert status == 403
+            assert b'token' in words
+    assert not pressed
+    status, words, _ = request('POST', here + 'calibrate', headers={'X-Token': token})
+    assert (status, words) == (200, b'measured')
+
+
+def test_no_token_is_needed_where_only_this_machine_can_look(serve):
+    server = serve()
+    assert server.url.endswith('/')
+    assert request('POST', address(server, 'calibrate'))[:2] == (200, b'measured')
+    assert request('GET', address(server, 'calibrate'))[0] == 405
+
+
+def test_a_calibration_that_fails_says_why(serve):
+    def fail():
+        raise OverlapError('nobody is there')
+
+    status, words, _ = request('POST', address(serve(fail), 'calibrate'))
+    assert (status, words) == (503, b'nobody is there')
+
+
+def test_a_snapshot_is_the_newest_picture(serve):
+    server = serve()
+    assert request('POST', address(server, 'snapshot'))[0] == 503
+    server.show(b'jpeg')
+    status, body, headers = request('POST', address(server, 'snapshot'))
+    assert (status, body, headers['Content-Type']) == (200, b'jpeg', 'image/jpeg')
+
+
+def test_a_port_in_use_is_a_sentence():
+    with socket.socket() as other:
+        other.bind(('127.0.0.1', 0))
+        other.listen()
+        port = other.getsockname()[1]
+        server = ViewerServer(ViewerSettings(port=port), calibrate=None, watched=None)
+        with pytest.raises(SettingError, match=f'port {port} of 127.0.0.1 is in use'):
+            server.start()
+
+
+def test_an_address_of_another_machine_is_a_sentence():
+    server = ViewerServer(ViewerSettings(host='203.0.113.7', port=0), calibrate=None, watched=None)
+    with pytest.raises(SettingError, match=r'cannot serve on port 0 of 203\.0\.113\.7'):
+        server.start()

@@ -1,0 +1,265 @@
+"""The viewer's page in a real browser: headless Chromium, as packaged by Debian."""
+
+import math
+import os
+import re
+import shutil
+import threading
+from concurrent.futures import Future
+
+import cv2
+import numpy as np
+import pytest
+from rig import camera_parameters, wait_for
+from selenium import webdriver
+from selenium.webdriver import ActionChains, Keys
+
+from fisheye_bridge.projection import surface_of
+from fisheye_geometry.surface import Surface
+from panorama_stitch.viewer_server import ViewerServer
+from panorama_stitch.viewer_settings import ViewerSettings
+
+DEADLINE_S = 30.0
+CLOSE_DEG = 1.0
+STRAIGHT_PX = 2.0
+"""A line two pixels of the panorama wide, enlarged."""
+SPOT_DEG = 1.5
+SURFACES = [
+    Surface('cylindrical', 1300, 560, 240.0, 640.0, 260.0),
+    Surface('equirectangular', 1300, 480, 240.0, 640.0, 240.0),
+    Surface('rectilinear', 1200, 700, 420.0, 600.0, 330.0),
+]
+MAGENTA, GREEN = (255, 0, 255), (0, 255, 0)
+
+
+@pytest.fixture(scope='module')
+def browser(tmp_path_factory):
+    if missing := [name for name in ('chromium', 'chromedriver') if not shutil.which(name)]:
+        message = f'{" and ".join(missing)} missing: sudo apt install chromium chromium-driver'
+        if os.environ.get('REQUIRE_BROWSER') == '1':
+            pytest.fail(message)
+        pytest.skip(message)
+    options = webdriver.ChromeOptions()
+    options.binary_location = shutil.which('chromium')
+    for switch in ('headless=new', 'hide-scrollbars', 'use-angle=swiftshader'):
+        options.add_argument(f'--{switch}')
+    # A machine without a graphics card still draws WebGL; root cannot have Chromium's sandbox.
+    options.add_argument('--enable-unsafe-swiftshader')
+    if os.geteuid() == 0:
+        options.add_argument('--no-sandbox')
+    downloads = tmp_path_factory.mktemp('downloads')
+    options.add_experimental_option('prefs', {'download.default_directory': str(downloads)})
+    driver = webdriver.Chrome(options, webdriver.ChromeService(shutil.which('chromedriver')))
+    driver.downloads = downloads
+    yield driver
+    driver.quit()
+
+
+class Page:
+    """The page as a person sees and uses it."""
+
+    def __init__(self, driver, url, width=900, height=560):
+        size = {'width': width, 'height': height, 'deviceScaleFactor': 1, 'mobile': width < 500}
+        driver.execute_cdp_cmd('Emulation.setDeviceMetricsOverride', size)
+        driver.get(url)
+        self.driver = driver
+
+    def find(self, name):
+        return self.driver.find_element('id', name)
+
+    def text(self, name):
+        return self.find(name).text
+
+    def press(self, keys):
+        ActionChains(self.driver).send_keys(keys).perform()
+
+    def shot(self, name):
+        """Give the pixels (height, width, 3) of an element."""
+        coded = np.frombuffer(self.find(name).screenshot_as_png, np.uint8)
+        return cv2.imdecode(coded, cv2.IMREAD_COLOR)
+
+    def point(self, name, x, y):
+        """Put the pointer on a place of an element and give the bearing and height shown."""
+        size = self.find(name).size
+        offset = round(x - size['width'] / 2), round(y - size['height'] / 2)
+        ActionChains(self.driver, 0).move_to_element_with_offset(
+            self.find(name), *offset
+        ).perform()
+        return float(self.find('bearing').get_attribute('data-bearing-deg'))
+
+    def until(self, condition, what):
+        return wait_for(condition, DEADLINE_S, what)
+
+
+@pytest.fixture
+def serve():
+    """Give a function that shows one picture over and over, until `stop` is called."""
+    ended = []
+
+    def start(surface, image, **settings):
+        measured = Future()
+        measured.set_result('measured anew')
+        server = ViewerServer(
+            ViewerSettings(port=0, **settings), calibrate=lambda: measured, watched=lambda: None
+        )
+        server.start()
+        server.tell(projection=vars(surface), rate_hz=10.0, delay_ms=20, problems=[])
+        jpeg = cv2.imencode('.jpg', image, (cv2.IMWRITE_JPEG_QUALITY, 95))[1].tobytes()
+        silent = threading.Event()
+
+        def feed():
+            while not silent.wait(0.2):
+                server.show(jpeg)
+
+        thread = threading.Thread(target=feed)
+        thread.start()
+
+        def fall_silent():
+            silent.set()
+            thread.join()
+
+        server.fall_silent = fall_silent
+        ended.extend([fall_silent, server.stop])
+        return server
+
+    yield start
+    for end in ended:
+        end()
+
+
+def painted(surface, bearing_deg, height_deg):
+    """Paint a panorama of a spot in a direction and of a straight bar that stands before us."""
+    y, x = np.mgrid[: surface.height, : surface.width]
+    rays = surface.rays(x.astype(float), y.astype(float))
+    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+    bearing, height = np.radians((bearing_deg, height_deg))
+    spot = (
+        np.cos(height) * np.sin(bearing),
+        -np.sin(height),
+        np.cos(height) * np.cos(bearing),
+    )
+    image = np.full((surface.height, surface.width, 3), 90, np.uint8)
+    ahead = rays[..., 2] > 0.3
+    with np.errstate(divide='ignore', invalid='ignore'):
+        across, up = rays[..., 0] / rays[..., 2], -rays[..., 1] / rays[..., 2]
+    image[ahead & (abs(up - 0.35 - 0.1 * across) < 0.006) & (abs(across) < 0.7)] = GREEN
+    image[rays @ spot > math.cos(math.radians(SPOT_DEG))] = MAGENTA
+    return image
+
+
+def where(shot, color):
+    """Pixels (n, 2) as x, y of the largest patch of a colour."""
+    near = (abs(shot.astype(int) - color).max(axis=2) < 90).astype(np.uint8)
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(near, connectivity=8)
+    if len(stats) < 2:
+        return np.zeros((0, 2))
+    return np.argwhere(labels == 1 + stats[1:, cv2.CC_STAT_AREA].argmax())[:, ::-1]
+
+
+def patch(page, name, color):
+    """Wait until an element shows a patch of a colour and give its pixels (n, 2)."""
+    found = np.zeros((0, 2))
+
+    def look():
+        nonlocal found
+        found = where(page.shot(name), color)
+        return len(found) > 9
+
+    page.until(look, f'{color} in {name}')
+    return found
+
+
+@pytest.mark.parametrize('surface', SURFACES, ids=lambda surface: surface.kind)
+def test_the_bearing_under_a_known_pixel_is_right(browser, serve, surface):
+    bearing_deg, height_deg = 31.0, 12.0
+    server = serve(surface, painted(surface, bearing_deg, height_deg))
+    page = Page(browser, server.url)
+    shown_deg = page.point('whole', *patch(page, 'whole', MAGENTA).mean(axis=0))
+    assert shown_deg == pytest.approx(bearing_deg, abs=CLOSE_DEG)
+    page.find('toggle').click()
+    page.press(Keys.ARROW_RIGHT + Keys.ARROW_UP + '+')
+    shown_deg = page.point('look', *patch(page, 'look', MAGENTA).mean(axis=0))
+    assert shown_deg == pytest.approx(bearing_deg, abs=CLOSE_DEG)
+    height = page.text('bearing').split(' · ')[1]
+    assert float(height.partition('°')[0]) == pytest.approx(height_deg, abs=CLOSE_DEG)
+
+
+@pytest.mark.parametrize('surface', SURFACES, ids=lambda surface: surface.kind)
+def test_straight_things_are_straight_when_one_looks_around(browser, serve, surface):
+    server = serve(surface, painted(surface, 31.0, 12.0))
+    page = Page(browser, server.url)
+    page.find('toggle').click()
+    page.press(Keys.ARROW_UP)
+    bar = patch(page, 'look', GREEN).astype(float)
+    assert np.ptp(bar[:, 0]) > 300
+    slope, start = np.polyfit(*bar.T, 1)
+    assert abs(slope * bar[:, 0] + start - bar[:, 1]).max() < STRAIGHT_PX + bar_height(bar)
+
+
+def bar_height(bar):
+    """Half the bar's own height, px."""
+    return max(np.ptp(bar[bar[:, 0] == column, 1]) for column in np.unique(bar[:, 0])) / 2
+
+
+def test_a_picture_that_stands_still_is_seen_to(browser, serve):
+    server = serve(SURFACES[0], painted(SURFACES[0], 0, 0), stale_after_s=0.5)
+    page = Page(browser, server.url)
+    page.until(lambda: page.text('condition') == 'Live', 'a live picture')
+    assert not page.find('veil').is_displayed()
+    server.fall_silent()
+    page.until(lambda: page.find('veil').is_displayed(), 'a veil')
+    page.until(lambda: page.text('veil') == 'No picture for 1 s', 'the age')
+    server.stop()
+    page.until(lambda: 'no connection' in page.text('veil'), 'the loss of the connection')
+
+
+def test_a_phone_starts_by_looking_around(browser, serve):
+    server = serve(SURFACES[0], painted(SURFACES[0], 0, 0))
+    page = Page(browser, server.url, width=390, height=844)
+    patch(page, 'look', MAGENTA)
+    assert page.find('map').is_displayed()
+    width = browser.execute_script('return document.documentElement.scrollWidth')
+    assert width == 390, 'nothing sticks out'
+
+
+def test_the_buttons_ask_for_the_token_where_others_can_look(browser, serve):
+    server = serve(SURFACES[0], painted(SURFACES[0], 0, 0), host='0.0.0.0')
+    url, _, token = server.url.partition('#token=')
+    page = Page(browser, f'http://127.0.0.1:{url.split(":")[2]}')
+    page.until(lambda: page.text('condition') == 'Live', 'a live picture')
+    for typed, answer in (('guess', 'needs the token'), (token, 'measured anew')):
+        page.press('c')
+        page.until(lambda: page.find('token').is_displayed(), 'a question')
+        page.find('token').clear()
+        page.find('token').send_keys(typed, Keys.ENTER)
+        page.until(lambda answer=answer: answer in page.text('answer'), answer)
+
+
+def test_the_whole_rig_in_a_browser(browser, rig, watcher):
+    rig.start_all(False, camera_parameters(None), frame_rate_hz=10.0)
+    rig.start('viewer', port=0)
+    said = wait_for(
+        lambda: rig.check_alive() or re.search(r'http://\S+', rig.log('viewer').read_text()),
+        DEADLINE_S,
+        'the address',
+    )
+    page = Page(browser, said[0])
+    page.until(lambda: re.match(r'[01]\.\d\d', page.text('overlap')), 'an overlap')
+    page.until(lambda: page.text('condition') == 'Live', 'a live picture')
+    first = page.shot('whole')
+    page.until(lambda: abs(page.shot('whole').astype(int) - first).max() > 100, 'a movement')
+    surface = surface_of(page.until(lambda: watcher.projection, 'the projection'))
+    width = page.find('whole').size['width']
+    x = 0.75 * surface.width - 0.5
+    ray = surface.rays(np.array([x]), np.array([surface.center_y_px]))[0]
+    true_deg = math.degrees(math.atan2(ray[0], ray[2]))
+    assert page.point('whole', 0.75 * width, 100) == pytest.approx(true_deg, abs=CLOSE_DEG)
+    page.press('c')
+    page.until(lambda: 'confidence' in page.text('answer'), 'a calibration')
+    page.press('s')
+    saved = page.until(lambda: list(browser.downloads.glob('panorama_*.jpg')), 'a snapshot')
+    assert cv2.imread(str(saved[0])).shape[:2] == (surface.height, surface.width)
+    rig.stop('left/capture')
+    page.until(lambda: 'Left camera: no sign of life' in page.text('problems'), 'the loss')
+    rig.stop('right/capture')
+    page.until(lambda: 'No picture for' in page.text('veil'), 'the end')
