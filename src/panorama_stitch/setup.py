@@ -24,7 +24,7 @@ setup(
     entry_points={
         'console_scripts': [
             'panorama_node = panorama_stitch.panorama_node:main',
-            'snapshot = panorama_stitch.snapshot:main',
+            'snapshot = panorama_stitch.snapshot_node:main',
             'stitch_node = panorama_stitch.stitch_node:main',
             'viewer_node = panorama_stitch.viewer_node:main',
         ],

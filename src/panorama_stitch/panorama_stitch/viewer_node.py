@@ -16,7 +16,7 @@ from sensor_msgs.msg import CompressedImage
 from fisheye_bridge.diagnostics import Diagnostics
 from fisheye_bridge.parameters import Parameters
 from fisheye_bridge.projection import surface_of
-from fisheye_bridge.qos import IMAGE, LATCHED
+from fisheye_bridge.qos import IMAGE_INPUT, LATCHED
 from fisheye_bridge.running import run
 from fisheye_geometry.errors import FisheyeError, OverlapError
 from panorama_stitch.viewer_server import ViewerServer
@@ -65,7 +65,7 @@ class ViewerNode(Node):
         """Subscribe while somebody looks: the JPEG is made for subscribers only."""
         if self._server.watchers and self._image is None:
             self._image = self.create_subscription(
-                CompressedImage, 'panorama/image/compressed', self._take_image, IMAGE
+                CompressedImage, 'panorama/image/compressed', self._take_image, IMAGE_INPUT
             )
         elif not self._server.watchers and self._image is not None:
             self.destroy_subscription(self._image)

@@ -1,0 +1,156 @@
+"""One panorama in a file that other programs understand.
+
+As PNG, with what its pixels look at in a JSON file beside it; or as an equirectangular JPEG with
+the GPano tags by which viewers of photo spheres know its place on the sphere.
+"""
+
+import json
+from datetime import datetime, timezone
+from math import atan, atan2, ceil, floor, hypot, pi
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from fisheye_geometry.errors import SettingError
+from fisheye_geometry.remap import RemapTable
+from fisheye_geometry.surface import Surface
+
+FORMATS = {'png': '.png', 'gpano': '.jpg'}
+"""How a panorama can be saved, and the suffix of the file."""
+
+_JPEG_QUALITY = 95
+_XMP_NAMESPACE = b'http://ns.adobe.com/xap/1.0/\0'
+_XMP = """<?xpacket begin="\ufeff" id="W5M0MpCehiHzreSzNTczkc9d"?>
+<x:xmpmeta xmlns:x="adobe:ns:meta/">
+  <rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#">
+    <rdf:Description rdf:about="" xmlns:GPano="http://ns.google.com/photos/1.0/panorama/"
+{tags}/>
+  </rdf:RDF>
+</x:xmpmeta>
+<?xpacket end="r"?>"""
+
+
+def save(path: Path, form: str, image: np.ndarray, surface: Surface, stamp_ns: int) -> list[Path]:
+    """Save a panorama.
+
+    Parameters
+    ----------
+    path
+        The file; its suffix is that of the format whatever it says.
+    form
+        One of `FORMATS`.
+    image
+        (height, width[, 3]) uint8, BGR or grey.
+    surface
+        What the panorama shows.
+    stamp_ns
+        When it was taken, ns since 1970.
+
+    Returns
+    -------
+    list of Path
+        The files that were written.
+
+    Raises
+    ------
+    SettingError
+        If a file cannot be written.
+    """
+    path = path.with_suffix(FORMATS[form])
+    if form == 'gpano':
+        return [_write(path, gpano(image, surface))]
+    description = {
+        'image': path.name,
+        'stamp_ns': stamp_ns,
+        'taken': datetime.fromtimestamp(stamp_ns / 1e9, timezone.utc).isoformat(),
+        'projection': vars(surface),
+    }
+    text = json.dumps(description, indent=2) + '\n'
+    return [
+        _write(path, cv2.imencode('.png', image)[1].tobytes()),
+        _write(path.with_suffix('.json'), text.encode()),
+    ]
+
+
+def gpano(image: np.ndarray, surface: Surface) -> bytes:
+    """Give an equirectangular JPEG of a panorama, with its GPano tags.
+
+    The tags are those of Google's Photo Sphere XMP Metadata.
+    """
+    sphere, left_px, top_px = on_sphere(surface)
+    equirectangular = RemapTable(surface, sphere, 'cubic')(image)
+    quality = (cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY)
+    jpeg = cv2.imencode('.jpg', equirectangular, quality)[1].tobytes()
+    full_px = round(2 * pi * sphere.focal_px)
+    tags = {
+        'ProjectionType': 'equirectangular',
+        'UsePanoramaViewer': 'True',
+        'FullPanoWidthPixels': full_px,
+        'FullPanoHeightPixels': full_px // 2,
+        'CroppedAreaImageWidthPixels': sphere.width,
+        'CroppedAreaImageHeightPixels': sphere.height,
+        'CroppedAreaLeftPixels': left_px,
+        'CroppedAreaTopPixels': top_px,
+    }
+    return with_xmp(jpeg, tags)
+
+
+def on_sphere(surface: Surface) -> tuple[Surface, int, int]:
+    """Give the equirectangular part of the sphere that a panorama covers.
+
+    Its scale is the panorama's own, rounded so that the sphere is a whole and even number of
+    pixels around; bearing 0 is in the middle of the sphere. What a panorama holds beyond 180
+    degrees to a side is left out.
+
+    Returns
+    -------
+    surface : Surface
+        The part, without columns or rows that are not covered to their middle.
+    left_px, top_px : int
+        Where the part begins on the whole sphere.
+    """
+    around_px = 2 * round(pi * surface.focal_px)
+    focal_px = around_px / (2 * pi)
+    left, right, top, bottom = (
+        angle * focal_px + around_px / share
+        for angle, share in zip(_limits(surface), (2, 2, 4, 4), strict=True)
+    )
+    left_px, top_px = max(ceil(left), 0), max(ceil(top), 0)
+    part = Surface(
+        'equirectangular',
+        width=min(floor(right), around_px) - left_px,
+        height=min(floor(bottom), around_px // 2) - top_px,
+        focal_px=focal_px,
+        center_x_px=around_px / 2 - 0.5 - left_px,
+        center_y_px=around_px / 4 - 0.5 - top_px,
+    )
+    return part, left_px, top_px
+
+
+def _limits(surface: Surface) -> tuple[float, ...]:
+    """Bearings of the outer edges, angles below the horizon of the upper and lower one, rad."""
+    x = surface.center_x_px
+    bearings = [(edge - x) / surface.focal_px for edge in (-0.5, surface.width - 0.5)]
+    if not surface.turns_are_shifts:
+        bearings = [atan(bearing) for bearing in bearings]
+    rays = [surface.rays(x, edge) for edge in (-0.5, surface.height - 0.5)]
+    return *bearings, *(atan2(down, hypot(right, ahead)) for right, down, ahead in rays)
+
+
+def with_xmp(jpeg: bytes, tags: dict[str, object]) -> bytes:
+    """Put GPano tags into a JPEG, behind its JFIF header."""
+    lines = '\n'.join(f'        GPano:{name}="{value}"' for name, value in tags.items())
+    segment = _XMP_NAMESPACE + _XMP.format(tags=lines).encode()
+    behind = 4 + int.from_bytes(jpeg[4:6], 'big')
+    app1 = b'\xff\xe1' + (len(segment) + 2).to_bytes(2, 'big') + segment
+    return jpeg[:behind] + app1 + jpeg[behind:]
+
+
+def _write(path: Path, content: bytes) -> Path:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    except OSError as error:
+        raise SettingError(f'{path} cannot be written: {error.strerror}') from error
+    return path

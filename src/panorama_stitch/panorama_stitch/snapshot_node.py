@@ -1,0 +1,93 @@
+"""Saves one panorama: the command `snapshot`."""
+
+import argparse
+import sys
+from pathlib import Path
+from time import monotonic
+
+import rclpy
+from fisheye_msgs.msg import Projection
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.time import Time
+from rclpy.utilities import remove_ros_args
+
+from fisheye_bridge.images import converted
+from fisheye_bridge.projection import surface_of
+from fisheye_bridge.qos import LATCHED
+from fisheye_bridge.topics import ImageSubscription
+from fisheye_geometry.errors import FisheyeError, SourceError
+from panorama_stitch.snapshot import FORMATS, save
+
+
+class SnapshotNode(Node):
+    """Waits for a panorama and for the projection that belongs to it.
+
+    Attributes
+    ----------
+    taken : tuple or None
+        Image (height, width[, 3]) uint8, BGR or grey; its surface; its stamp, ns.
+    """
+
+    def __init__(self, **kwargs):
+        super().__init__('snapshot', **kwargs)
+        self.taken = None
+        self._surface = None
+        self.create_subscription(Projection, 'panorama/projection', self._place, LATCHED)
+        self._image = ImageSubscription(self, 'panorama/image', self._take)
+
+    def _place(self, message) -> None:
+        self._surface = surface_of(message)
+
+    def _take(self, image, encoding, header) -> None:
+        surface = self._surface
+        # Behind a new projection there may still be a picture of the old one.
+        if surface and image.shape[1::-1] == (surface.width, surface.height):
+            image = converted(image, encoding, 'mono8' if encoding == 'mono8' else 'bgr8')
+            self.taken = image, surface, Time.from_msg(header.stamp).nanoseconds
+
+
+def parse() -> argparse.Namespace:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(prog='snapshot', description='Save one panorama.')
+    parser.add_argument(
+        '--format',
+        choices=FORMATS,
+        default='png',
+        help='png: as it is, with its projection in a JSON file beside it; '
+        'gpano: equirectangular JPEG that viewers of photo spheres read',
+    )
+    parser.add_argument('--out', type=Path, default=Path('panorama'), help='the file to write')
+    parser.add_argument('--timeout', type=float, default=10.0, help='how long to wait, s')
+    return parser.parse_args(remove_ros_args(sys.argv)[1:])
+
+
+def wait(node: SnapshotNode, timeout_s: float) -> tuple:
+    """Spin until a panorama was taken; a `SourceError` if none comes."""
+    deadline = monotonic() + timeout_s
+    while node.taken is None:
+        rclpy.spin_once(node, timeout_sec=0.1)
+        if monotonic() > deadline:
+            topic = node.resolve_topic_name('panorama/image')
+            raise SourceError(f'no panorama came on {topic} within {timeout_s:g} s')
+    return node.taken
+
+
+def main() -> int:
+    """Save a panorama and say where."""
+    arguments = parse()
+    rclpy.init()
+    node = SnapshotNode()
+    try:
+        taken = wait(node, arguments.timeout)
+        for path in save(arguments.out, arguments.format, *taken):
+            print(f'Saved {path}')
+    except FisheyeError as error:
+        print(f'snapshot: {error}', file=sys.stderr)
+        return 1
+    except (KeyboardInterrupt, ExternalShutdownException):
+        return 130
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown()
+    return 0

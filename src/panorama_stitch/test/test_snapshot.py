@@ -1,0 +1,107 @@
+import json
+import re
+from xml.etree import ElementTree
+
+import cv2
+import numpy as np
+import pytest
+
+from fisheye_geometry.errors import SettingError
+from fisheye_geometry.surface import Surface
+from panorama_stitch.snapshot import gpano, on_sphere, save
+
+SURFACES = [
+    Surface('cylindrical', 1200, 480, 215.0, 590.0, 250.0),
+    Surface('equirectangular', 900, 400, 160.0, 450.0, 190.0),
+    Surface('rectilinear', 700, 400, 300.0, 340.0, 210.0),
+]
+WHOLE = Surface('equirectangular', 1200, 500, 180.0, 600.0, 250.0)
+"""Wider than the sphere."""
+CLOSE_PX = 0.5
+STAMP_NS = 1_700_000_000_250_000_000
+
+
+def spotted(surface, direction):
+    """Paint a panorama with a spot in a direction, a unit vector (3,)."""
+    y, x = np.mgrid[: surface.height, : surface.width]
+    rays = surface.rays(x, y)
+    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+    near = np.clip((rays @ direction - np.cos(0.03)) / (1 - np.cos(0.03)), 0, 1)
+    return np.repeat((near * 255).astype(np.uint8)[..., None], 3, axis=2)
+
+
+def xmp(jpeg):
+    """Give the GPano tags of a JPEG by walking its segments."""
+    at = 2
+    while jpeg[at : at + 2] != b'\xff\xda':
+        length = int.from_bytes(jpeg[at + 2 : at + 4], 'big')
+        content = jpeg[at + 4 : at + 2 + length]
+        if content.startswith(b'http://ns.adobe.com/xap/1.0/\0'):
+            packet = content.partition(b'\0')[2].decode()
+            root = ElementTree.fromstring(re.sub(r'<\?.*?\?>', '', packet))
+            (description,) = root.iter('{http://www.w3.org/1999/02/22-rdf-syntax-ns#}Description')
+            return {key.partition('}')[2]: value for key, value in description.attrib.items()}
+        at += 2 + length
+    raise AssertionError('there is no XMP')
+
+
+@pytest.mark.parametrize('surface', SURFACES, ids=lambda surface: surface.kind)
+def test_a_direction_is_where_photo_sphere_viewers_look_for_it(surface):
+    bearing, height = np.radians((25.0, 10.0))
+    direction = np.array(
+        [np.cos(height) * np.sin(bearing), -np.sin(height), np.cos(height) * np.cos(bearing)]
+    )
+    jpeg = gpano(spotted(surface, direction), surface)
+    tags = xmp(jpeg)
+    image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_GRAYSCALE).astype(float)
+    size = int(tags['CroppedAreaImageWidthPixels']), int(tags['CroppedAreaImageHeightPixels'])
+    assert image.shape[::-1] == size
+    assert tags['ProjectionType'] == 'equirectangular'
+    around, upright = int(tags['FullPanoWidthPixels']), int(tags['FullPanoHeightPixels'])
+    assert around == 2 * upright
+    image[image < 40] = 0
+    y, x = (np.average(axis, weights=image) for axis in np.indices(image.shape))
+    x += int(tags['CroppedAreaLeftPixels']) + 0.5
+    y += int(tags['CroppedAreaTopPixels']) + 0.5
+    assert x == pytest.approx((0.5 + bearing / (2 * np.pi)) * around, abs=CLOSE_PX)
+    assert y == pytest.approx((0.5 - height / np.pi) * upright, abs=CLOSE_PX)
+
+
+@pytest.mark.parametrize('surface', [*SURFACES, WHOLE])
+def test_the_part_lies_within_the_sphere_and_is_covered(surface):
+    part, left_px, top_px = on_sphere(surface)
+    around_px = round(2 * np.pi * part.focal_px)
+    assert min(left_px, top_px) >= 0
+    assert left_px + part.width <= around_px
+    assert top_px + part.height <= around_px // 2
+    middle = part.height // 2
+    row = np.full((surface.height, surface.width), 200, np.uint8)
+    jpeg = gpano(row, surface)
+    image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_GRAYSCALE)
+    assert image[middle].min() > 150, 'no black columns'
+    assert image[:, round(part.center_x_px)].min() > 150, 'no black rows'
+
+
+def test_a_png_has_its_projection_beside_it(tmp_path):
+    surface = SURFACES[0]
+    image = np.random.default_rng(1).integers(0, 255, (480, 1200, 3), np.uint8)
+    paths = save(tmp_path / 'new' / 'here.jpg', 'png', image, surface, STAMP_NS)
+    assert paths == [tmp_path / 'new' / 'here.png', tmp_path / 'new' / 'here.json']
+    np.testing.assert_array_equal(cv2.imread(str(paths[0])), image)
+    described = json.loads(paths[1].read_text())
+    assert Surface(**described['projection']) == surface
+    assert (described['image'], described['stamp_ns']) == ('here.png', STAMP_NS)
+    assert described['taken'] == '2023-11-14T22:13:20.250000+00:00'
+
+
+def test_a_gpano_file_is_one_jpeg(tmp_path):
+    image = np.zeros((480, 1200), np.uint8)
+    (path,) = save(tmp_path / 'here', 'gpano', image, SURFACES[0], STAMP_NS)
+    assert path == tmp_path / 'here.jpg'
+    assert xmp(path.read_bytes())['UsePanoramaViewer'] == 'True'
+
+
+def test_a_file_that_cannot_be_written_is_named(tmp_path):
+    (tmp_path / 'file').touch()
+    with pytest.raises(SettingError, match=r'file/here\.png cannot be written'):
+        save(tmp_path / 'file' / 'here', 'png', np.zeros((480, 1200)), SURFACES[0], STAMP_NS)
