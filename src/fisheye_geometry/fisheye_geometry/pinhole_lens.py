@@ -1,0 +1,80 @@
+"""The conventional lens, `plumb_bob` and `rational_polynomial` in ROS."""
+
+from functools import cached_property
+
+import cv2
+import numpy as np
+
+from fisheye_geometry.lens_model import Lens
+
+
+class PinholeLens(Lens):
+    """Conventional lens with the distortion of Brown and Conrady (`plumb_bob` and rational).
+
+    The formulas are those of OpenCV's `projectPoints`, which does the forward mapping here.
+
+    References
+    ----------
+    Brown, "Decentering distortion of lenses", Photogrammetric Engineering 32(3), 1966.
+    """
+
+    model = 'plumb_bob'
+    coefficient_counts = (0, 4, 5, 8)
+    _STEEPEST = 1.5
+    """No plane picture reaches 90 degrees; rad."""
+
+    @property
+    def ros_model(self) -> str:
+        """`distortion_model` of REP-104, which names the rational form apart."""
+        return 'rational_polynomial' if len(self.distortion) == 8 else 'plumb_bob'
+
+    @cached_property
+    def max_angle_rad(self) -> float:
+        """Angle at which the radial distortion folds back, or the image circle's edge, rad."""
+        angles = np.linspace(0.0, self._STEEPEST, 3000)
+        rays = np.stack([np.sin(angles), np.zeros_like(angles), np.cos(angles)], axis=-1)
+        folds = np.flatnonzero(np.diff(self._distort(rays)[:, 0]) <= 0)
+        limit = angles[folds[0]] if len(folds) else self._STEEPEST
+        return float(min(limit, self.visible_angle_rad))
+
+    def _distort(self, rays):
+        rays = np.asarray(rays, float)
+        none = np.zeros(3)
+        pixels, _ = cv2.projectPoints(
+            rays.reshape(-1, 1, 3), none, none, np.eye(3), np.array(self.distortion)
+        )
+        return pixels.reshape(*rays.shape[:-1], 2)
+
+    def _undistort(self, normalized):
+        shape = normalized.shape[:-1]
+        target = normalized.reshape(-1, 2)
+        plane = self._start(target)
+        for _ in range(20):
+            value = self._on_plane(plane)
+            step = 1e-6
+            dx = (self._on_plane(plane + np.array([step, 0.0])) - value) / step
+            dy = (self._on_plane(plane + np.array([0.0, step])) - value) / step
+            jacobian = np.stack([dx, dy], axis=-1)
+            determinant = np.linalg.det(jacobian)
+            jacobian[np.abs(determinant) < 1e-9] = np.eye(2)
+            miss = (target - value)[..., None]
+            plane = plane + np.linalg.solve(jacobian, miss)[..., 0].clip(-0.5, 0.5)
+        rays = np.concatenate([plane, np.ones((len(plane), 1))], axis=-1)
+        angle = np.arctan(np.hypot(*plane.T))
+        seen = np.hypot(*(self._on_plane(plane) - target).T) < 1e-9
+        seen &= angle <= self.max_angle_rad * (1 + 1e-12)
+        rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+        return rays.reshape(*shape, 3), seen.reshape(shape)
+
+    def _start(self, target):
+        """Undo the radial part by a table: near enough for Newton's method to converge."""
+        angles = np.linspace(0.0, self.max_angle_rad, 4096)
+        rays = np.stack([np.sin(angles), np.zeros_like(angles), np.cos(angles)], axis=-1)
+        radius = np.hypot(*target.T)
+        plain = np.tan(np.interp(radius, self._distort(rays)[:, 0], angles))
+        return (
+            target * np.divide(plain, radius, out=np.ones_like(radius), where=radius > 0)[:, None]
+        )
+
+    def _on_plane(self, plane):
+        return self._distort(np.concatenate([plane, np.ones((len(plane), 1))], axis=-1))
