@@ -1,5 +1,5 @@
 # Every target first makes what it needs; `make` alone lists them.
-SHELL := /bin/bash
+SHELL := bash
 PYTHON ?= python3
 .NOTPARALLEL:
 
@@ -35,20 +35,20 @@ lint: .venv/.done ## check style and format
 	@source .venv/local_setup.bash && ruff check . && ruff format --check .
 
 clean: ## remove everything that the targets above made
-	rm -rf .venv build install log
-
-# Nodes of these runs meet none that run on this machine already.
-demo test test-faults bench bench-%: export ROS_DOMAIN_ID := $(shell echo $$((RANDOM % 101 + 1)))
+	rm -rf .venv build install log out
 
 .venv/.done: force
-	@command -v $(PYTHON) > /dev/null || { echo 'Python is missing: sudo apt install python3' >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(not (3, 10) <= sys.version_info[:2] <= (3, 13))' 2> /dev/null || \
+	    { echo 'Python 3.10 to 3.13 is needed: sudo apt install python3, or make PYTHON=python3.12' >&2; exit 1; }
 	@$(PYTHON) tools/setup_environment.py
 
-changed = $(sort $(filter $(packages),$(subst /, ,$?)) $(if $(filter config%,$?),panorama_stitch))
+# What $? lists decides which packages are built again.
+changed = $(if $(filter .venv/.done src,$?),$(packages),$(sort \
+    $(filter $(packages),$(subst /, ,$?)) $(if $(filter config%,$?),panorama_stitch)))
 install/.built: .venv/.done $(sources)
-	@$(if $(filter .venv/.done src,$?),rm -rf build install,rm -rf $(changed:%=build/%) $(changed:%=install/%))
-	@source .venv/local_setup.bash && env -u PYTHONDONTWRITEBYTECODE colcon build \
-	    --base-paths src $(if $(filter .venv/.done src,$?),,--packages-select $(changed))
+	@rm -rf $(changed:%=build/%) $(changed:%=install/%)
+	@source .venv/local_setup.bash && env -u PYTHONDONTWRITEBYTECODE \
+	    colcon build --base-paths src --packages-select $(changed)
 	@touch $@
 
 force:

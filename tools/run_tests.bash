@@ -2,6 +2,7 @@
 # `make test` calls this in a shell that has sourced env.bash.
 
 export PYTHONDONTWRITEBYTECODE=1  # no caches among the sources
+export ROS_DOMAIN_ID=$((RANDOM % 100 + 1))  # apart from other nodes on this machine
 colcon test-result --delete-yes > /dev/null
 colcon test --base-paths src --executor sequential \
   --event-handlers console_direct+ --return-code-on-test-failure

@@ -22,7 +22,6 @@ VENV = ROOT / '.venv'
 REQUIREMENTS = ROOT / 'requirements.txt'
 DONE = VENV / '.done'
 VERSION = '{}.{}'.format(*sys.version_info[:2])
-SUPPORTED = '3.10', '3.11', '3.12', '3.13'
 # Distributions whose module has another name.
 MODULES = {'empy': 'em', 'opencv-python-headless': 'cv2', 'pyyaml': 'yaml'}
 
@@ -50,9 +49,9 @@ def main():
 
 
 def check_machine(ros):
-    """Stop where something is missing that only the user can install."""
-    if VERSION not in SUPPORTED:
-        stop(f'Python {VERSION} is not supported: name one from 3.10 to 3.13, make PYTHON=python3.12')
+    """Stop where something is in the way that only the user can change."""
+    if re.search(r'[\s:;$\'"]', str(ROOT)):
+        stop(f'colcon cannot work below a folder with such a name, rename it: {ROOT}')
     if ros not in ('', 'jazzy'):
         stop(f'ROS 2 {ros} is sourced: use a shell with ROS 2 Jazzy, or with none')
     if ros and not os.environ.get('AMENT_PREFIX_PATH'):
@@ -100,8 +99,9 @@ def missing_beside_ros():
 def install(requirements):
     """Have pip install into `.venv`, and say how far it is."""
     say('Installing Python packages, which takes a minute or more the first time')
-    command = [VENV / 'bin' / 'python', '-m', 'pip', 'install', '--prefer-binary', *requirements]
-    command += ['--no-cache-dir', '--disable-pip-version-check', '--progress-bar=off']
+    command = [VENV / 'bin' / 'python', '-m', 'pip', 'install', '--no-cache-dir', *requirements]
+    command += ['--prefer-binary', '--use-pep517']  # empy has no wheel
+    command += ['--disable-pip-version-check', '--progress-bar=off']
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as pip:
         collected = 0
         for line in pip.stdout:
@@ -136,17 +136,26 @@ def correct_cmake_files(share, packages):
 
 def shell_setup(ros, packages):
     """Return what bash needs to find `.venv`: the script that colcon expects in a prefix."""
-    find_programs = f'[[ ":$PATH:" == *":{VENV}/bin:"* ]] || export PATH="{VENV}/bin:$PATH"\n'
+    lines = [prepend('PATH', VENV / 'bin')]
     if ros:
-        return find_programs + f'export PYTHONPATH="$PYTHONPATH:{packages}"\n'
-    return (
-        'if [ -n "$ROS_DISTRO" ]; then\n'
-        f'  echo "{ROOT} was built without the ROS 2 that is sourced: run make build." >&2\n'
-        '  return 1\n'
-        'fi\n'
-        f'{find_programs}'
-        f'export AMENT_PREFIX_PATH="{VENV}"\n'
-    )
+        lines += [prepend('PYTHONPATH', packages)]  # the Python of ROS does not look into .venv
+    else:
+        lines += [
+            '[ -z "$ROS_DISTRO" ] ||',
+            '  { echo "This was built without ROS 2 sourced: make build." >&2; return 1; }',
+            'unset COLCON_PREFIX_PATH  # another checkout would become a part of this one',
+            f'export AMENT_PREFIX_PATH="{VENV}"',
+            prepend('LD_LIBRARY_PATH', VENV / 'lib', *sorted(packages.glob('ros_*.libs'))),
+            '# The wheels need not start each Python twice to set it, in no order.',
+            'export _ROS_WHEELS_BOOTSTRAP_COMPLETE=1',
+        ]
+    return '\n'.join(lines) + '\n'
+
+
+def prepend(name, *folders):
+    """Return bash that puts folders first in a path variable, unless they are there."""
+    first = ':'.join(map(str, folders))
+    return f'[[ ":${name}:" == *":{first}:"* ]] || export {name}="{first}${{{name}:+:${name}}}"'
 
 
 def say(line):

@@ -1,0 +1,77 @@
+"""The packages agree with each other, and env.bash gives a shell in which they run."""
+
+import ast
+import os
+import subprocess
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+MANIFESTS = sorted(ROOT.glob('src/*/package.xml'))
+SETUPS = sorted(ROOT.glob('src/*/setup.py'))
+
+
+def shell(script, folder=ROOT, **environment):
+    return subprocess.run(
+        ['bash', '-c', script],
+        cwd=folder,
+        env={'PATH': os.environ['PATH'], 'HOME': os.environ['HOME'], **environment},
+        capture_output=True,
+        text=True,
+    )
+
+
+def keywords(setup):
+    call = ast.parse(setup.read_text()).body[-1].value
+    return {keyword.arg: keyword.value for keyword in call.keywords}
+
+
+@pytest.mark.parametrize('tag', ['version', 'license', 'maintainer'])
+def test_packages_agree(tag):
+    assert len({ElementTree.parse(path).findtext(tag) for path in MANIFESTS}) == 1
+
+
+@pytest.mark.parametrize('setup', SETUPS, ids=lambda path: path.parent.name)
+def test_setup_has_the_version_of_the_manifest(setup):
+    manifest = ElementTree.parse(setup.with_name('package.xml'))
+    assert keywords(setup)['version'].value == manifest.findtext('version')
+
+
+@pytest.mark.parametrize('setup', SETUPS, ids=lambda path: path.parent.name)
+def test_every_executable_is_installed_and_has_a_main(setup):
+    scripts = keywords(setup).get('entry_points')
+    for script in ast.literal_eval(scripts)['console_scripts'] if scripts else []:
+        name, module = script.removesuffix(':main').split(' = ')
+        package = setup.parent.name
+        assert os.access(ROOT / 'install' / package / 'lib' / package / name, os.X_OK)
+        body = ast.parse((setup.parent / f'{module.replace(".", "/")}.py').read_text()).body
+        assert 'main' in [node.name for node in body if isinstance(node, ast.FunctionDef)]
+
+
+def test_environment_works_anywhere_and_twice(tmp_path):
+    source = f'source "{ROOT}/env.bash"'
+    once = shell(f'set -eu; {source}; env', tmp_path)
+    twice = shell(f'set -eu; {source}; {source}; env', tmp_path)
+    assert once.returncode == 0, once.stderr
+    assert sorted(once.stdout.splitlines()) == sorted(twice.stdout.splitlines())
+    assert 'ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST' in once.stdout
+    assert 'fastdds.xml' in once.stdout
+
+
+def test_environment_keeps_what_the_user_chose():
+    chosen = {
+        'FASTRTPS_DEFAULT_PROFILES_FILE': '/my/profile.xml',
+        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET',
+        'ROS_LOG_DIR': '/my/log',
+    }
+    lines = shell('source env.bash; env', **chosen).stdout.splitlines()
+    assert {f'{name}={value}' for name, value in chosen.items()} <= set(lines)
+
+
+def test_environment_says_that_nothing_is_built(tmp_path):
+    (tmp_path / 'env.bash').write_text((ROOT / 'env.bash').read_text())
+    result = shell('source ./env.bash', tmp_path)
+    assert result.returncode != 0
+    assert 'make build' in result.stderr
