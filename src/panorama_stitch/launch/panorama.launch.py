@@ -3,8 +3,10 @@
 Across a link the same file starts both halves: `robot:=true` the captures, `base:=true` the rest.
 """
 
+from math import cos, degrees, radians, sin
 from pathlib import Path
 
+import yaml
 from ament_index_python.packages import get_package_share_directory
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironmentVariable
 from launch_ros.actions import Node
@@ -25,6 +27,10 @@ ARGUMENTS = {
     'right_source': ('', 'what the right camera is'),
     'left_camera_info_url': ('', 'calibration file of the left camera'),
     'right_camera_info_url': ('', 'calibration file of the right camera'),
+    'view': ('false', 'also show the panorama in a browser'),
+    'host': ('', 'address on which browsers are served; 0.0.0.0 for other machines too'),
+    'transforms': ('false', 'also publish where the optical frames of the cameras point'),
+    'yaw_deg': ('', 'angle between the cameras; from overlap_file if it is not given'),
 }
 
 
@@ -46,6 +52,11 @@ def nodes(context):
             output='screen',
         )
 
+    extras = []
+    if arguments['view'] == 'true':
+        extras.append(node('panorama_stitch', 'viewer_node', 'viewer', host='host'))
+    if arguments['transforms'] == 'true':
+        extras += transforms(arguments)
     if arguments['composed'] == 'true':
         own = {
             f'{camera}.{name}': f'{camera}_{name}'
@@ -53,7 +64,7 @@ def nodes(context):
             for name in ('source', 'camera_info_url')
         }
         shared = {name: name for name in ('frame_rate_hz', 'overlap_file')}
-        return [node('panorama_stitch', 'panorama_node', 'panorama', **own, **shared)]
+        return [node('panorama_stitch', 'panorama_node', 'panorama', **own, **shared), *extras]
     captures = [
         node(
             'fisheye_capture',
@@ -71,8 +82,41 @@ def nodes(context):
         for camera in CAMERAS
     ]
     rest.append(node('panorama_stitch', 'stitch_node', 'stitch', overlap_file='overlap_file'))
+    rest += extras
     robot, base = (arguments[half] == 'true' for half in ('robot', 'base'))
     return (captures if robot or not base else []) + (rest if base or not robot else [])
+
+
+def transforms(arguments):
+    """Turn the optical frames of the cameras away from the panorama's, by half the angle each."""
+    yaw_rad = radians(float(arguments['yaw_deg'] or measured_yaw_deg(arguments['overlap_file'])))
+    return [
+        Node(
+            package='tf2_ros',
+            executable='static_transform_publisher',
+            name=f'{camera}_transform',
+            # In an optical frame y points down: a turn about it is one to the right.
+            arguments=[
+                '--frame-id', 'panorama_optical_frame',
+                '--child-frame-id', f'{camera}_optical_frame',
+                '--qy', f'{sin(turn_rad / 2):.9f}',
+                '--qw', f'{cos(turn_rad / 2):.9f}',
+            ],
+        )
+        for camera, turn_rad in zip(CAMERAS, (-yaw_rad / 2, yaw_rad / 2), strict=True)
+    ]  # fmt: skip
+
+
+def measured_yaw_deg(path):
+    """Give the angle between the two axes that was measured and saved, deg."""
+    if not Path(path).is_file():
+        raise RuntimeError(f"transforms:=true needs yaw_deg or overlap_file; '{path}' is no file")
+    saved = yaml.safe_load(Path(path).read_text())
+    (left, right), (overlap,) = saved['cameras'], saved['overlaps']
+    if not overlap['found'] or left['surface'] == 'rectilinear':
+        raise RuntimeError(f'{path} holds no angle between the cameras; give yaw_deg')
+    apart_px = overlap['offset_x_px'] + right['center_x_px'] - left['center_x_px']
+    return degrees(apart_px / left['focal_px'])
 
 
 def generate_launch_description():
