@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -19,8 +20,8 @@ INTERPOLATIONS = tuple(_INTERPOLATIONS)
 
 _OUTSIDE_PX = -100
 """Far enough from the picture that no interpolation reaches it."""
-_BAND_ROWS = 64
-"""Rows computed at once, which bounds the memory that the float64 rays take."""
+_BAND_ROWS = 16
+"""Rows drawn at once: so few that what they need of the picture stays in the cache meanwhile."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,25 @@ class Turn:
 LEVEL = Turn()
 
 
+class _Band(NamedTuple):
+    """Some rows of a surface.
+
+    Attributes
+    ----------
+    rows
+        Of the surface.
+    pixels, fractions
+        Fixed-point maps as `cv2.convertMaps` gives them.
+    fresh
+        Rows of the picture that are needed here and not in the band above.
+    """
+
+    rows: slice
+    pixels: np.ndarray
+    fractions: np.ndarray | None
+    fresh: slice
+
+
 class RemapTable:
     """Fixed-point maps from a picture to a surface.
 
@@ -79,21 +99,18 @@ class RemapTable:
         self.surface = surface
         self._input_shape = (source.height, source.width)
         self._flag = _INTERPOLATIONS[interpolation]
-        shape = (surface.height, surface.width)
-        self.valid = np.empty(shape, bool)
-        self._pixels = np.empty((*shape, 2), np.int16)
-        nearest = interpolation == 'nearest'
-        self._fractions = None if nearest else np.empty(shape, np.uint16)
+        self.valid = np.empty((surface.height, surface.width), bool)
+        self._bands = []
+        needed = range(0)
         for top in range(0, surface.height, _BAND_ROWS):
             rows = slice(top, min(top + _BAND_ROWS, surface.height))
             where, self.valid[rows] = _source_pixels(source, surface, turn, rows)
+            nearest = interpolation == 'nearest'
             pixels, fractions = cv2.convertMaps(where, None, cv2.CV_16SC2, nninterpolation=nearest)
-            self._pixels[rows] = pixels
-            if not nearest:
-                self._fractions[rows] = fractions
-        for array in (self.valid, self._pixels, self._fractions):
-            if array is not None:
-                array.setflags(write=False)
+            above, needed = needed, _rows_needed(where[..., 1][self.valid[rows]])
+            band = _Band(rows, pixels, None if nearest else fractions, _fresh(needed, above))
+            self._bands.append(band)
+        self.valid.setflags(write=False)
 
     def __call__(self, image: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
         """Correct a picture.
@@ -122,16 +139,33 @@ class RemapTable:
                 f'its calibration is for {width}x{height} px'
             )
         expected = self.valid.shape + image.shape[2:]
-        if out is not None and (out.shape != expected or out.dtype != image.dtype):
+        if out is None:
+            out = np.empty(expected, image.dtype)
+        if out.shape != expected or out.dtype != image.dtype:
             raise ImageFormatError(f'out is {out.dtype}{out.shape}; expected {expected}')
-        return cv2.remap(
-            image,
-            self._pixels,
-            self._fractions,
-            self._flag,
-            dst=out,
-            borderMode=cv2.BORDER_CONSTANT,
-        )
+        for rows, pixels, fractions, fresh in self._bands:
+            # Read in order, the picture comes from memory ahead of need; along curves it does not.
+            cv2.sumElems(image[fresh])
+            cv2.remap(
+                image,
+                pixels,
+                fractions,
+                self._flag,
+                dst=out[rows],
+                borderMode=cv2.BORDER_CONSTANT,
+            )
+        return out
+
+
+@lru_cache(maxsize=16)
+def remap_table(
+    source: Lens | Surface,
+    surface: Surface,
+    interpolation: str = 'linear',
+    turn: Turn = LEVEL,
+) -> RemapTable:
+    """Build a `RemapTable`, or give the one that was built from the same arguments."""
+    return RemapTable(source, surface, interpolation, turn)
 
 
 def _source_pixels(source: Lens | Surface, surface: Surface, turn: Turn, rows: slice):
@@ -145,12 +179,12 @@ def _source_pixels(source: Lens | Surface, surface: Surface, turn: Turn, rows: s
     return where.astype(np.float32), seen
 
 
-@lru_cache(maxsize=16)
-def remap_table(
-    source: Lens | Surface,
-    surface: Surface,
-    interpolation: str = 'linear',
-    turn: Turn = LEVEL,
-) -> RemapTable:
-    """Build a `RemapTable`, or give the one that was built from the same arguments."""
-    return RemapTable(source, surface, interpolation, turn)
+def _rows_needed(y_px: np.ndarray) -> range:
+    return range(int(y_px.min()), int(y_px.max()) + 2) if y_px.size else range(0)
+
+
+def _fresh(needed: range, above: range) -> slice:
+    """Rows that are needed but were not already above."""
+    if needed.stop > above.stop:
+        return slice(max(needed.start, above.stop), needed.stop)
+    return slice(needed.start, min(needed.stop, above.start))

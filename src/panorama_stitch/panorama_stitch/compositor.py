@@ -1,37 +1,62 @@
 """Composing: the cameras' pictures drawn straight into the panorama."""
 
 from collections.abc import Sequence
+from functools import partial
+from itertools import pairwise
+from typing import NamedTuple
 
-import cv2
 import numpy as np
 
-from panorama_stitch.layout import Layout
-from panorama_stitch.view import View
+from panorama_stitch.blend import Blend, Feather, Multiband
+from panorama_stitch.gain import GainCompensation
+from panorama_stitch.layout import Layout, Seam
+from panorama_stitch.parallel import share, thread_count
+from panorama_stitch.view import Cut, View
 
-BLENDS = ('none', 'feather')
+_BLENDS = {'feather': Feather, 'multiband': Multiband}
+BLENDS = {'none': 0.0, 'feather': 1.0, 'multiband': 4.0}
+"""The ways to blend, and the width of the strip that each needs in units of `feather_deg`."""
+_SLABS_PER_THREAD = 2
+"""So that a thread that is held up leaves work to the others."""
 
 
 class Compositor:
     """Draws panoramas of one layout; all that can be known before the pictures come is prepared.
 
-    Each view is drawn into the columns that are its own; only in a seam are two views drawn, and
-    blended with weights that are 0 where a view shows nothing.
+    Each view is drawn into the columns that are its own, and with a neighbour into the columns of
+    a seam, where the two are blended.
     """
 
-    def __init__(self, layout: Layout, views: Sequence[View]):
+    def __init__(
+        self,
+        layout: Layout,
+        views: Sequence[View],
+        blend: str = 'feather',
+        gain: GainCompensation | None = None,
+    ):
+        """Prepare.
+
+        Parameters
+        ----------
+        layout, views
+            What to draw where.
+        blend
+            How to blend seams that have a width, one of `BLENDS`.
+        gain
+            Keeps the views equally bright; None: they are drawn as they are.
+        """
         self.layout = layout
-        height = layout.surface.height
-        self._own = []
-        for index, (view, origin) in enumerate(zip(views, layout.origins, strict=True)):
-            begin, end = layout.columns(index)
-            if end > begin:
-                cut = view.cut(begin - origin.x_px, -origin.y_px, end - begin, height)
-                self._own.append((index, slice(begin, end), cut))
-        self._fades = [
-            _Fade(index, layout, views)
-            for index, seam in enumerate(layout.seams)
-            if seam.end > seam.begin
-        ]
+        self._gain = gain
+        self._fades = [_Fade(i, layout, views, blend) for i in range(len(layout.seams))]
+        edges = np.linspace(0, layout.surface.height, _SLABS_PER_THREAD * thread_count() + 1)
+        slabs = [slice(*rows) for rows in pairwise(edges.round().astype(int))]
+        self._parts: list[list[_Part]] = [[] for _ in slabs]
+        share(
+            [
+                partial(self._prepare, parts, rows, views)
+                for parts, rows in zip(self._parts, slabs, strict=True)
+            ]
+        )
 
     def compose(self, images: Sequence[np.ndarray], out: np.ndarray) -> None:
         """Draw a panorama.
@@ -48,46 +73,72 @@ class Compositor:
         ImageFormatError
             If a picture has not the size that its view was made for.
         """
-        for index, columns, cut in self._own:
-            cut(images[index], out[:, columns])
+        if self._gain:
+            self._gain.update(images)
         for fade in self._fades:
-            fade.draw(images, out)
+            fade.expect(out)
+        share([partial(self._draw, parts, images, out) for parts in self._parts])
+        for fade in self._fades:
+            fade.blend(out)
+
+    def _prepare(self, parts: list['_Part'], rows: slice, views: Sequence[View]) -> None:
+        for index, (view, origin) in enumerate(zip(views, self.layout.origins, strict=True)):
+            begin, end = self.layout.drawn(index)
+            if end > begin:
+                size = end - begin, rows.stop - rows.start
+                cut = view.cut(begin - origin.x_px, rows.start - origin.y_px, *size)
+                parts.append(_Part(index, rows, slice(begin, end), cut))
+
+    def _draw(self, parts: Sequence['_Part'], images: Sequence[np.ndarray], out: np.ndarray):
+        for index, rows, columns, cut in parts:
+            if index:
+                self._fades[index - 1].keep(rows, out)
+            drawn = out[rows, columns]
+            cut(images[index], drawn)
+            if self._gain:
+                self._gain.apply(index, drawn)
+
+
+class _Part(NamedTuple):
+    """Where one thread draws how much of a view."""
+
+    index: int
+    rows: slice
+    columns: slice
+    cut: Cut
 
 
 class _Fade:
-    """The seam between two views: both drawn, then blended."""
+    """The seam between two views: the right one is drawn over the left one, which is kept."""
 
-    def __init__(self, index: int, layout: Layout, views: Sequence[View]):
-        self._index = index
-        begin, end = layout.seams[index]
-        self._columns = slice(begin, end)
-        shape = layout.surface.height, end - begin
-        ramp = (np.arange(end - begin, dtype=np.float32) + 0.5) / (end - begin)
-        weights = []
-        self._cuts = []
-        for which, weight in ((index, 1 - ramp), (index + 1, ramp)):
-            view, origin = views[which], layout.origins[which]
-            cut = view.cut(begin - origin.x_px, -origin.y_px, shape[1], shape[0])
-            self._cuts.append(cut)
-            weights.append(weight * _seen(view, cut, shape))
-        # Rows in which no view shows anything stay black with any weights.
-        total = np.maximum(weights[0] + weights[1], np.finfo(np.float32).tiny)
-        self._weights = [np.ascontiguousarray(weight / total) for weight in weights]
-        self._drawn = None
+    def __init__(self, index: int, layout: Layout, views: Sequence[View], blend: str):
+        seam = layout.seams[index]
+        self._columns = slice(*seam)
+        self._left = np.empty(0, np.uint8)
+        self._blend: Blend | None = None
+        if seam.end > seam.begin:
+            seen = [_seen(views[i], layout, i, seam) for i in (index, index + 1)]
+            self._blend = _BLENDS[blend](*seen)
 
-    def draw(self, images: Sequence[np.ndarray], out: np.ndarray) -> None:
-        strip = out[:, self._columns]
-        if self._drawn is None or self._drawn[0].shape != strip.shape:
-            self._drawn = [np.empty(strip.shape, np.uint8) for _ in range(2)]
-        for drawn, cut, image in zip(self._drawn, self._cuts, images[self._index :], strict=False):
-            cut(image, drawn)
-        cv2.blendLinear(*self._drawn, *self._weights, dst=strip)
+    def expect(self, out: np.ndarray) -> None:
+        """Make room for the left view of a panorama."""
+        shape = out[:, self._columns].shape
+        if self._left.shape != shape:
+            self._left = np.empty(shape, np.uint8)
+
+    def keep(self, rows: slice, out: np.ndarray) -> None:
+        """Keep some rows of the left view before the right one is drawn."""
+        self._left[rows] = out[rows, self._columns]
+
+    def blend(self, out: np.ndarray) -> None:
+        """Blend the views."""
+        if self._blend:
+            self._blend(self._left, out[:, self._columns])
 
 
-def _seen(view: View, cut, shape) -> np.ndarray:
-    """(height, width) float32, 1 where the cut shows anything."""
-    source = (view.source.height, view.source.width)
-    seen = np.ones(source, np.uint8) if view.seen is None else view.seen.astype(np.uint8)
-    drawn = np.empty(shape, np.uint8)
-    cut(seen * 255, drawn)
-    return (drawn == 255).astype(np.float32)
+def _seen(view: View, layout: Layout, index: int, seam: Seam) -> np.ndarray:
+    """(height, seam's width) bool: where a view shows anything in a seam."""
+    origin, height = layout.origins[index], layout.surface.height
+    width = seam.end - seam.begin
+    cut = view.cut(seam.begin - origin.x_px, -origin.y_px, width, height)
+    return view.shown(cut, (height, width))

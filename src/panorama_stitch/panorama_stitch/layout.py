@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from math import ceil
 from typing import NamedTuple
 
 import cv2
@@ -48,11 +49,11 @@ class Layout:
     origins: tuple[Origin, ...]
     seams: tuple[Seam, ...]
 
-    def columns(self, index: int) -> tuple[int, int]:
-        """Columns [begin, end) that show view `index` and no other."""
-        begin = self.seams[index - 1].end if index else 0
-        last = index == len(self.seams)
-        return begin, self.surface.width if last else self.seams[index].begin
+    def drawn(self, index: int) -> tuple[int, int]:
+        """Columns [begin, end) in which view `index` is drawn, those of its seams among them."""
+        begin = self.seams[index - 1].begin if index else 0
+        end = self.seams[index].end if index < len(self.seams) else self.surface.width
+        return begin, end
 
 
 def lay_out(
@@ -107,7 +108,9 @@ def lay_out(
 def _seam(left_end: float, right_begin: float, fade_px: float, width: int) -> Seam:
     """Put the fade in the middle of the columns that both views share."""
     if not fade_px or right_begin >= left_end:
-        at = min(max(round(right_begin), 0), width)
+        # Drawn between its pixels, a view may lack the outermost one.
+        at = round(right_begin) if right_begin == round(right_begin) else ceil(right_begin) + 1
+        at = min(max(at, 0), width)
         return Seam(at, at)
     middle, half = (left_end + right_begin) / 2, min(fade_px, left_end - right_begin) / 2
     return Seam(max(round(middle - half), 0), min(round(middle + half), width))
@@ -127,9 +130,7 @@ def covered(layout: Layout, views: Sequence[View]) -> np.ndarray:
     shape = (layout.surface.height, layout.surface.width)
     shown = np.zeros(shape, bool)
     for index, (view, origin) in enumerate(zip(views, layout.origins, strict=True)):
-        begin, end = layout.columns(index)
-        begin = layout.seams[index - 1].begin if index else begin
-        end = layout.seams[index].end if index < len(layout.seams) else end
+        begin, end = layout.drawn(index)
         x, y = round(origin.x_px), round(origin.y_px)
         valid = view.valid()
         if (x, y) != origin:

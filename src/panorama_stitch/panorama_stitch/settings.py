@@ -39,12 +39,20 @@ class PanoramaOutputSettings(OverlapSettings):
     )
     blend: str = setting(
         'feather',
-        'How neighbours meet: none lays the right over the left as published, feather fades.',
-        choices=BLENDS,
+        'How neighbours meet: none lays the right over the left as published, feather fades, '
+        'multiband fades coarse detail over a wider strip than fine detail.',
+        choices=tuple(BLENDS),
         live=True,
     )
     feather_deg: float = setting(
-        4.0, 'Width of the fade at a seam.', minimum=0.1, maximum=60.0, live=True
+        4.0,
+        'Width of the fade at a seam; multiband takes four times as much for coarse detail.',
+        minimum=0.1,
+        maximum=60.0,
+        live=True,
+    )
+    gain_compensation: bool = setting(
+        True, 'Make the cameras equally bright, as measured where they overlap.', live=True
     )
     crop: str = setting(
         'valid',

@@ -10,7 +10,8 @@ from fisheye_geometry.errors import ImageFormatError, OverlapError
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.remap import LEVEL
 from fisheye_geometry.surface import Surface
-from panorama_stitch.compositor import Compositor
+from panorama_stitch.compositor import BLENDS, Compositor
+from panorama_stitch.gain import GainCompensation
 from panorama_stitch.layout import lay_out
 from panorama_stitch.overlap import Overlap, measure_overlap
 from panorama_stitch.settings import PanoramaOutputSettings
@@ -127,13 +128,15 @@ class Stitcher:
             replace(view, turn=turn) for view, turn in zip(self._views(group), turns, strict=True)
         ]
         fade_px = np.radians(settings.feather_deg) * views[0].surface.focal_px
+        fade_px *= BLENDS[settings.blend]
         layout = lay_out(
             views,
             [(overlap.offset_x_px, overlap.offset_y_px) for overlap in overlaps],
-            fade_px=0.0 if settings.blend == 'none' else fade_px,
+            fade_px=fade_px,
             crop=settings.crop if all(overlap.found for overlap in overlaps) else 'none',
         )
-        return Compositor(layout, views)
+        gain = GainCompensation(layout, views, group) if settings.gain_compensation else None
+        return Compositor(layout, views, settings.blend, gain)
 
     def _views(self, group: Group | None = None) -> list[View]:
         focal_px = self._places[0][1].focal_px

@@ -10,7 +10,7 @@ from fisheye_geometry.lens import Lens
 from fisheye_geometry.remap import LEVEL, RemapTable, Turn, remap_table
 from fisheye_geometry.surface import Surface
 
-Cut = Callable[[np.ndarray, np.ndarray], None]
+Cut = Callable[[np.ndarray, np.ndarray], object]
 """Draws a part of a view: takes the camera's picture and the array to draw into."""
 
 
@@ -45,14 +45,11 @@ class View:
 
     def valid(self) -> np.ndarray:
         """(surface height, surface width) bool: where the corrected picture shows anything."""
-        everywhere = np.ones((self.source.height, self.source.width), bool)
-        seen = everywhere if self.seen is None else self.seen
         if self.is_corrected:
-            return seen
-        table = self._table
+            return self._seen
         if self.seen is None:
-            return table.valid
-        return table.valid & (table(seen.astype(np.uint8) * 255) == 255)
+            return self._table.valid
+        return self.shown(self._table, self._table.valid.shape)
 
     def corrected(self, image: np.ndarray) -> np.ndarray:
         """Correct a whole picture; exactly 0 where nothing is seen and nowhere else."""
@@ -67,12 +64,32 @@ class View:
         """Prepare to draw the part of the corrected picture whose upper left pixel is (x, y)."""
         if self.is_corrected:
             return _Copy(round(x_px), round(y_px), width, height, self.source)
+        return self._drawn_on(self.surface.window(x_px, y_px, width, height))
+
+    def samples(
+        self, x_px: float, y_px: float, width: int, height: int, step: float
+    ) -> RemapTable:
+        """Prepare to draw only every `step`-th row and column of the same part."""
         window = self.surface.window(x_px, y_px, width, height)
-        return RemapTable(self.source, window, self.interpolation, self.turn)
+        return self._drawn_on(window.with_focal(window.focal_px / step))
+
+    def shown(self, cut: Cut, shape: tuple[int, int]) -> np.ndarray:
+        """(height, width) bool: where a cut of that shape shows anything."""
+        drawn = np.empty(shape, np.uint8)
+        cut(self._seen.astype(np.uint8) * 255, drawn)
+        return drawn == 255
+
+    @property
+    def _seen(self) -> np.ndarray:
+        everywhere = np.ones((self.source.height, self.source.width), bool)
+        return everywhere if self.seen is None else self.seen
 
     @property
     def _table(self) -> RemapTable:
         return remap_table(self.source, self.surface, self.interpolation, self.turn)
+
+    def _drawn_on(self, surface: Surface) -> RemapTable:
+        return RemapTable(self.source, surface, self.interpolation, self.turn)
 
 
 class _Copy:

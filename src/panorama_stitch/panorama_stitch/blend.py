@@ -1,0 +1,102 @@
+"""Blending: how two views become one in the columns in which both are drawn."""
+
+from itertools import pairwise
+from math import log2
+from typing import Protocol
+
+import cv2
+import numpy as np
+
+_COARSEST_COLUMNS = 8
+"""A multiband blend halves its strip until so few columns are left to fade over."""
+_UNIT = 1 << 14
+"""A weight of 1, as an integer."""
+
+
+class Blend(Protocol):
+    """Makes one picture of two views."""
+
+    def __call__(self, left: np.ndarray, right: np.ndarray) -> None:
+        """Blend views (height, width[, channels]) uint8 into the place of the right one.
+
+        The left one is of no use any more afterwards.
+        """
+
+
+class Feather:
+    """Fades from the left view into the right one."""
+
+    def __init__(self, left_seen: np.ndarray, right_seen: np.ndarray):
+        """Prepare.
+
+        Parameters
+        ----------
+        left_seen, right_seen
+            (height, width) bool: where each view shows anything; elsewhere the other is alone.
+        """
+        width = left_seen.shape[1]
+        ramp = (np.arange(width, dtype=np.float32) + 0.5) / width
+        weights = left_seen * (1 - ramp), right_seen * ramp
+        # Where no view shows anything it stays black with any weights.
+        total = np.maximum(weights[0] + weights[1], np.finfo(np.float32).tiny)
+        self._weights = [np.ascontiguousarray(weight / total) for weight in weights]
+
+    def __call__(self, left: np.ndarray, right: np.ndarray) -> None:
+        """As `Blend`."""
+        cv2.blendLinear(left, right, *self._weights, dst=right)
+
+
+class Multiband:
+    """Fades coarse detail over the whole width and fine detail over little of it.
+
+    A blend is linear in the views, so the pyramid of their difference is enough (P. J. Burt,
+    E. H. Adelson, "A multiresolution spline with application to image mosaics", 1983,
+    https://doi.org/10.1145/245.247).
+    """
+
+    def __init__(self, left_seen: np.ndarray, right_seen: np.ndarray):
+        """Prepare; parameters as of `Feather`."""
+        height, width = left_seen.shape
+        self._left_alone = (left_seen & ~right_seen).astype(np.uint8)
+        self._right_alone = (right_seen & ~left_seen).astype(np.uint8)
+        left_half = np.tile(np.arange(width) < width / 2, (height, 1))
+        self._weights = [left_half.astype(np.float32)]
+        for _ in range(max(1, int(log2(width / _COARSEST_COLUMNS)))):
+            self._weights.append(cv2.pyrDown(self._weights[-1]))
+        self._levels: list[_Level] = []
+        self._shape: tuple[int, ...] = ()
+
+    def __call__(self, left: np.ndarray, right: np.ndarray) -> None:
+        """As `Blend`."""
+        if self._shape != right.shape:
+            self._shape = right.shape
+            self._levels = [_Level(weight, right.shape[2:]) for weight in self._weights]
+        # Where one is alone the views do not differ.
+        cv2.copyTo(left, self._left_alone, right)
+        cv2.copyTo(right, self._right_alone, left)
+        levels = self._levels
+        cv2.subtract(left, right, dst=levels[0].band, dtype=cv2.CV_16S)
+        for fine, coarse in pairwise(levels):
+            cv2.pyrDown(fine.band, dst=coarse.band)
+        for fine, coarse in pairwise(levels):
+            cv2.subtract(fine.band, fine.enlarged(coarse), dst=fine.band)
+        for level in levels:
+            cv2.multiply(level.band, level.weight, dst=level.band, scale=1 / _UNIT)
+        for coarse, fine in pairwise(reversed(levels)):
+            cv2.add(fine.band, fine.enlarged(coarse), dst=fine.band)
+        cv2.add(right, levels[0].band, dst=right, dtype=cv2.CV_8U)
+
+
+class _Level:
+    """One level of a pyramid: its picture, (height, width[, channels]) int16, and its weights."""
+
+    def __init__(self, weight: np.ndarray, channels: tuple[int, ...]):
+        self.weight = (weight * _UNIT).astype(np.int16)
+        if channels:
+            self.weight = cv2.merge([self.weight] * channels[0])
+        self.band = np.empty_like(self.weight)
+        self._room = np.empty_like(self.weight)
+
+    def enlarged(self, coarse: '_Level') -> np.ndarray:
+        """Give the picture of the next coarser level in the size of this one."""
+        return cv2.pyrUp(coarse.band, dst=self._room, dstsize=self._room.shape[1::-1])
