@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from panorama_stitch.structure import Structure
+from panorama_stitch.structure import Reduced
 
 _DOUBT = 6.0
 """How far chance carries the correlation of n pixels is about this over sqrt(n)."""
@@ -49,17 +49,17 @@ class Landscape:
 
 
 def correlate(
-    left: Structure, right: Structure, x: range, y: range, min_pixels: int
+    left: Reduced, right: Reduced, x: range, y: range, min_pixels: int
 ) -> Landscape:
     """Correlate two structures at the offsets `x`, `y`; fewer common pixels score -1."""
     shape = tuple(
-        cv2.getOptimalDFTSize(a + b)
-        for a, b in zip(left.detail.shape, right.detail.shape, strict=True)
+        cv2.getOptimalDFTSize(max(a, b) + max(map(abs, (*offsets, 0))))
+        for a, b, offsets in zip(left.image.shape, right.image.shape, (y, x), strict=True)
     )
     rows, columns = np.asarray(y), np.asarray(x)
     spot = np.ix_(rows % shape[0], columns % shape[1])
     (l, l2, l1), (r, r2, r1) = (
-        [_spectrum(image, shape) for image in (s.detail, s.detail * s.detail, s.valid)]
+        [_spectrum(image, shape) for image in (s.image, s.image * s.image, s.valid)]
         for s in (left, right)
     )
     both, left_energy, right_energy, pixels = (
@@ -68,10 +68,14 @@ def correlate(
     )
     energy = np.sqrt(np.maximum(left_energy, 0) * np.maximum(right_energy, 0))
     correlation = both / np.maximum(energy, 1.0)
-    # Flat areas say nothing: they do not count as evidence either.
-    evidence = np.maximum(np.minimum(energy, pixels), 1.0)
-    score = np.where(pixels >= min_pixels, correlation - _DOUBT / np.sqrt(evidence), -1.0)
+    score = np.where(pixels >= min_pixels, less_chance(correlation, energy, pixels), -1.0)
     return Landscape(columns, rows, correlation, score)
+
+
+def less_chance(correlation, energy, pixels):
+    """Lower a correlation by what chance may give so few pixels, or so little structure."""
+    # Flat areas say nothing: they do not count as evidence.
+    return correlation - _DOUBT / np.sqrt(np.maximum(np.minimum(energy, pixels), 1.0))
 
 
 def _spectrum(image, shape):

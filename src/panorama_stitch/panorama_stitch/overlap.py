@@ -16,17 +16,18 @@ from fisheye_geometry.remap import LEVEL, Turn
 from fisheye_geometry.settings import setting
 from fisheye_geometry.surface import Surface
 from panorama_stitch import paper
-from panorama_stitch.alignment import Alignment, Pose, align
+from panorama_stitch.alignment import align, certainty
 from panorama_stitch.correlation import Landscape, correlate
 from panorama_stitch.particles import Particle, facing_halves
+from panorama_stitch.pose import Pose
 from panorama_stitch.structure import plain, structure
 
-FINE = True
 METHODS = ('particles', 'correlation', 'paper')
 
-_COARSE_PX_PER_DEG, _MIDDLE_PX_PER_DEG, _FINE_PX_PER_DEG = 1.0, 2.0, 4.0
-"""Resolutions of the search, of the verification and of the refinement."""
-_CANDIDATES = 4
+_SEARCH_PX_PER_DEG, _FINE_PX_PER_DEG = 2.0, 4.0
+_SEARCH_DEG, _FINE_DEG = 3.2, 0.8
+_CANDIDATES = 8
+_CLOSE = 0.1
 _APART_DEG = 3.0
 """Offsets nearer to each other are the same answer."""
 _FOCAL_TOLERANCE = 1e-3
@@ -230,35 +231,38 @@ class _Measurement:
         )
 
     def _by_structure(self, method: str) -> Overlap:
-        step = self._step(_COARSE_PX_PER_DEG)
+        step = self._step(_SEARCH_PX_PER_DEG)
         left, right = structure(self._left, step), structure(self._right, step)
         landscape = self._search(left, right, step)
-        if method == 'particles':
-            pass
-        starts = []
-        if not starts:
-            method = 'correlation'
-            peaks = landscape.peaks(_CANDIDATES, round(_APART_DEG * self._px_per_deg / step))
-            starts = [Pose(landscape.x[c] * step, landscape.y[r] * step) for r, c in peaks]
-        middle = self._step(_MIDDLE_PX_PER_DEG)
-        views = structure(self._left, middle), structure(self._right, middle)
-        verified = sorted(
-            (self._align(*views, start, middle, 3.2) for start in starts),
-            key=lambda a: -a.agreement,
-        )
-        if not verified:
+        peaks = landscape.peaks(_CANDIDATES, round(_APART_DEG * self._px_per_deg / step))
+        method = 'correlation'
+        if not peaks:
             return self._side_by_side(method, 0.0, 'the views show no common structure')
-        best = verified[0]
-        if best.agreement < self._settings.min_confidence:
-            return self._side_by_side(method, best.agreement, 'no common scene')
+        surface = self._reduced_surface(right, step)
+        level = self._level_y / step
+        best, confidence = None, -1.0
+        for row, column in peaks:
+            if landscape.score[row, column] < landscape.score[peaks[0]] - _CLOSE:
+                continue
+            start = Pose(float(landscape.x[column]), float(landscape.y[row]))
+            pose = align(left, right, surface, start, level, radians(_SEARCH_DEG), self._settings.correct_tilt)
+            for one in (start, pose):
+                sure = certainty(left, right, surface, one)
+                if sure > confidence:
+                    best, confidence = one, sure
+        if confidence < self._settings.min_confidence:
+            return self._side_by_side(method, confidence, 'no common scene')
         fine = self._step(_FINE_PX_PER_DEG)
         views = plain(self._left, fine), plain(self._right, fine)
-        pose = self._align(*views, best.pose, fine, 0.8).pose if FINE else best.pose
+        pose = align(
+            *views, self._reduced_surface(views[1], fine), best.scaled(step / fine), self._level_y / fine,
+            radians(_FINE_DEG), self._settings.correct_tilt,
+        ).scaled(fine)
         x = pose.x_px + self._left_start
         return Overlap(
             method=method, found=True, offset_x_px=x, offset_y_px=pose.y_px,
             turn=pose.turn, overlap_px=self._surfaces[0].width - x,
-            confidence=min(best.agreement, 1.0),
+            confidence=confidence,
             message=f'found {x:.1f} px; pitch {degrees(pose.pitch_rad):.2f}',
         )
 
@@ -270,22 +274,17 @@ class _Measurement:
         level = round(self._level_y / step)
         narrowest = round(self._settings.min_overlap_deg * self._px_per_deg / step)
         y = range(level - rise, level + rise + 1)
-        x = range(narrowest - right.detail.shape[1], left.detail.shape[1] - narrowest + 1)
-        return correlate(left, right, x, y, min_pixels=narrowest * left.detail.shape[0] // 4)
+        x = range(narrowest - right.image.shape[1], left.image.shape[1] - narrowest + 1)
+        return correlate(left, right, x, y, min_pixels=narrowest * left.image.shape[0] // 4)
 
-    def _align(self, left, right, start: Pose, step, search_deg, usual=None) -> Alignment:
-        height, width = right.detail.shape
+    def _reduced_surface(self, right, step) -> Surface:
+        height, width = right.image.shape
         s = self._surfaces[1]
-        surface = replace(
+        return replace(
             s, width=width, height=height, focal_px=s.focal_px / step,
             center_x_px=(s.center_x_px + 0.5) / step - 0.5,
             center_y_px=(s.center_y_px + 0.5) / step - 0.5,
         )
-        result = align(
-            left, right, surface, start.scaled(1 / step), Pose(0.0, self._level_y / step) if usual is None else usual.scaled(1 / step),
-            radians(search_deg), self._settings.correct_tilt,
-        )
-        return replace(result, pose=result.pose.scaled(step))
 
     def _side_by_side(self, method, confidence, message) -> Overlap:
         return Overlap(

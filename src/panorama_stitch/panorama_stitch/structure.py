@@ -6,55 +6,55 @@ and in dark places; a horizon, which fits at every offset, and mere noise count 
 """
 
 from dataclasses import dataclass
+from math import ceil
 
 import cv2
 import numpy as np
 
-_SMOOTHING_PX = 0.7
-_WINDOW_PX = 17
+_RIM_PX = 2
+"""The edge of what a lens sees is half dark."""
+_SMOOTHING_PX = 1.4
+_WINDOW_PX = 25
 """What changes more slowly along a row than over this width is no structure."""
-_NEIGHBOURHOOD_PX = 33
+_NEIGHBOURHOOD_PX = 49
 """Contrast is made equal over squares of this size."""
 _NOISE_LEVEL = 3.0
 """Contrast below it is not raised, grey levels after reduction."""
 
 
 @dataclass(frozen=True)
-class Structure:
-    """The structure of a picture.
+class Reduced:
+    """A picture or its structure, reduced in size.
 
     Attributes
     ----------
-    detail
-        (h, w) float32, mostly -3 to 3, 0 where `valid` is.
+    image
+        (h, w) float32, 0 where nothing is seen.
     valid
         (h, w) uint8: 1 where the lens sees something, with a margin, else 0.
     """
 
-    detail: np.ndarray
+    image: np.ndarray
     valid: np.ndarray
 
 
-def structure(picture: np.ndarray, step: int) -> Structure:
+def structure(picture: np.ndarray, step: int) -> Reduced:
     """Find the structure of a picture (height, width) uint8, reduced to 1 / `step` in size."""
     picture, valid = _reduce(picture, step)
     weight = valid.astype(np.float32)
     smooth = _average(picture * weight, weight, cv2.GaussianBlur, (0, 0), _SMOOTHING_PX)
-    detail = smooth - _average(smooth * weight, weight, cv2.blur, (_WINDOW_PX, 1))
+    detail = smooth - _trend(smooth * weight, weight)
     detail *= weight
     square = (_NEIGHBOURHOOD_PX, _NEIGHBOURHOOD_PX)
     contrast = _average(detail * detail, weight, cv2.blur, square)
-    valid = cv2.erode(
-        valid, np.ones((3, 3), np.uint8), borderType=cv2.BORDER_CONSTANT, borderValue=0
-    )
-    return Structure(detail * valid / np.sqrt(contrast + _NOISE_LEVEL**2), valid)
+    return Reduced(detail * weight / np.sqrt(contrast + _NOISE_LEVEL**2), valid)
 
 
-def plain(picture: np.ndarray, step: int) -> Structure:
+def plain(picture: np.ndarray, step: int) -> Reduced:
     """Give a picture itself, reduced and a little smoothed."""
     picture, valid = _reduce(picture, step)
     weight = valid.astype(np.float32)
-    return Structure(_average(picture * weight, weight, cv2.GaussianBlur, (0, 0), 1.0) * weight, valid)
+    return Reduced(_average(picture * weight, weight, cv2.GaussianBlur, (0, 0), 1.0) * weight, valid)
 
 
 def _reduce(picture, step):
@@ -67,7 +67,31 @@ def _reduce(picture, step):
             cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
             for image in (picture, seen)
         )
-    return picture.astype(np.float32), (seen == 255).astype(np.uint8)
+    rim = 2 * ceil(_RIM_PX / step) + 1
+    valid = cv2.erode(
+        (seen == 255).astype(np.uint8), np.ones((rim, rim), np.uint8),
+        borderType=cv2.BORDER_CONSTANT, borderValue=0,
+    )
+    return picture.astype(np.float32), valid
+
+
+def _trend(image, weight):
+    """Fit a line to what is seen of each row around each pixel.
+
+    At the rim, where a window has one side only, a mere mean would take the falling light for
+    structure, and rims would match rims.
+    """
+    x = np.arange(image.shape[1], dtype=np.float32) - image.shape[1] / 2
+    total, mean_x, square_x, mean, product = (
+        cv2.blur(values, (_WINDOW_PX, 1))
+        for values in (weight, weight * x, weight * (x * x), image, image * x)
+    )
+    total += 1e-6
+    mean_x /= total
+    mean /= total
+    spread = square_x / total - mean_x * mean_x
+    slope = (product / total - mean_x * mean) / (spread + 1.0)
+    return mean + slope * (x - mean_x)
 
 
 def _average(image, weight, smooth, *how):
