@@ -9,7 +9,8 @@ from pathlib import Path
 import yaml
 from ament_index_python.packages import get_package_share_directory
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironmentVariable
-from launch_ros.actions import Node
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node, SetParameter
 
 from launch import LaunchDescription
 
@@ -31,6 +32,7 @@ ARGUMENTS = {
     'host': ('', 'address on which browsers are served; 0.0.0.0 for other machines too'),
     'transforms': ('false', 'also publish where the optical frames of the cameras point'),
     'yaw_deg': ('', 'angle between the cameras; from overlap_file if it is not given'),
+    'use_sim_time': ('false', 'go by /clock, as a recording that is played gives it'),
 }
 
 
@@ -128,6 +130,7 @@ def generate_launch_description():
                 for name, (value, text) in ARGUMENTS.items()
             ),
             SetEnvironmentVariable('FASTRTPS_DEFAULT_PROFILES_FILE', str(CONFIG / 'fastdds.xml')),
+            SetParameter('use_sim_time', LaunchConfiguration('use_sim_time')),
             OpaqueFunction(function=nodes),
         ]
     )
