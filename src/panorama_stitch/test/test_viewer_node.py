@@ -13,9 +13,12 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from fisheye_msgs.msg import Overlap, Overlaps, Projection
 from fisheye_msgs.srv import CalibrateOverlap
+from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.time import Time
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CompressedImage
 
 from fisheye_bridge.qos import IMAGE, LATCHED
@@ -161,6 +164,32 @@ def test_the_page_is_told_what_the_rig_says(ros):
     assert [problem['text'] for problem in told['problems']] == ['Left camera: unplugged']
     assert told['skew_ms'] == 2.5
     assert 0 <= told['delay_ms'] < 1000 * DEADLINE_S
+
+
+def test_the_delay_of_a_recording_goes_by_its_own_time(ros):
+    stitching, node = Stitching(ros.context), viewer(ros, port=0, use_sim_time=True)
+    stitching.set_parameters([Parameter('use_sim_time', value=True)])
+    player = Node('player', context=ros.context)
+    clock = player.create_publisher(Clock, '/clock', 10)
+    recorded = Time(nanoseconds=1_600_000_000_000_000_000)
+    begin = time.monotonic()
+
+    def play():
+        now = recorded + Duration(seconds=time.monotonic() - begin)
+        clock.publish(Clock(clock=now.to_msg()))
+
+    player.create_timer(0.02, play)
+    ros.start(stitching, node, player)
+
+    async def hear(session):
+        async with session.ws_connect(f'{node.url}live') as stream:
+            async for message in stream:
+                if message.type is aiohttp.WSMsgType.TEXT:
+                    told = json.loads(message.data)
+                    if told.get('delay_ms') is not None:
+                        return told
+
+    assert -100 <= visit(hear)['delay_ms'] < 1000 * DEADLINE_S
 
 
 def press_calibrate(node):
