@@ -77,10 +77,10 @@ def test_the_synthetic_rig_is_stitched_where_it_should_be(rig, watcher):
     answer = watcher.calibrate()
     assert answer.success
     assert answer.overlaps[0].offset_x_px == pytest.approx(true_px, abs=CLOSE_PX)
-    picture = watcher.picture()
     projection = watcher.projection
-    assert picture.shape == (projection.height, projection.width, 3)
-    assert picture.any(axis=2).all(), 'no black inside'
+    size = (projection.height, projection.width, 3)
+    wait_for(lambda: watcher.picture().shape == size, START_S, 'a panorama of that projection')
+    assert watcher.picture().any(axis=2).all(), 'no black inside'
 
 
 @pytest.mark.parametrize('name', ['workshop', 'hall', 'forest', 'apartment', 'bridge'])

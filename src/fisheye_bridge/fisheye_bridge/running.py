@@ -7,7 +7,7 @@ import traceback
 
 import rclpy
 from rclpy.exceptions import ParameterException
-from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
@@ -18,15 +18,13 @@ _LONGEST_WAIT_S = 0.2
 """A signal is noticed after so long at the latest."""
 
 
-def run(node_class: type[Node], *, threads: int = 1) -> int:
+def run(node_class: type[Node]) -> int:
     """Run a node until SIGINT or SIGTERM.
 
     Parameters
     ----------
     node_class
         Built without arguments; a `FisheyeError` that it raises is logged.
-    threads
-        How many callbacks may run at once, if they are in groups that allow it.
 
     Returns
     -------
@@ -42,7 +40,7 @@ def run(node_class: type[Node], *, threads: int = 1) -> int:
         # rclpy's own handlers would end the context while threads of the node still publish.
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         node = node_class()
-        executor = MultiThreadedExecutor(threads) if threads > 1 else SingleThreadedExecutor()
+        executor = SingleThreadedExecutor()
         executor.add_node(node)
         while not ended.is_set():
             executor.spin_once(timeout_sec=_LONGEST_WAIT_S)

@@ -9,10 +9,10 @@ from math import degrees, nan
 import numpy as np
 from fisheye_msgs.msg import Overlap, Overlaps, Particle, Projection
 from fisheye_msgs.srv import CalibrateOverlap
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 from std_msgs.msg import Header
 
+from fisheye_bridge.awaiting import awaitable
 from fisheye_bridge.diagnostics import ERROR, WARN, Diagnostics, Report
 from fisheye_bridge.images import ImageBuffer, converted
 from fisheye_bridge.parameters import Parameters
@@ -53,12 +53,7 @@ class PanoramaBase(Node):
         self.live = LiveStitcher(
             self.settings, publish=self._publish, changed=self._announce, warn=self._warn
         )
-        self.create_service(
-            CalibrateOverlap,
-            'calibrate_overlap',
-            self._calibrate,
-            callback_group=MutuallyExclusiveCallbackGroup(),
-        )
+        self.create_service(CalibrateOverlap, 'calibrate_overlap', self._calibrate)
         self._diagnostics = Diagnostics(self, self._report)
 
     @property
@@ -109,13 +104,14 @@ class PanoramaBase(Node):
         in_use = self.live.stitcher.in_use(self.settings)
         self._overlaps.publish(Overlaps(header=header, overlaps=self._messages(in_use)))
 
-    def _calibrate(self, request, response):
+    async def _calibrate(self, request, response):
         try:
             if request.method not in ('', *overlap.METHODS):
                 raise SettingError(
                     f"method is '{request.method}'; expected one of {', '.join(overlap.METHODS)}"
                 )
-            measured = self.live.calibrate(request.method, request.save).result()
+            # Frames keep coming meanwhile: a coroutine, not a thread, waits for the answer.
+            measured = await awaitable(self.live.calibrate(request.method, request.save))
         except FisheyeError as error:
             response.success, response.message = False, str(error)
             return response

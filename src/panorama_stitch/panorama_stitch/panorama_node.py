@@ -94,5 +94,5 @@ class _Eye:
 
 
 def main() -> int:
-    """Run the node; frames keep coming while a service call is answered."""
-    return run(PanoramaNode, threads=2)
+    """Run the node."""
+    return run(PanoramaNode)

@@ -35,5 +35,5 @@ class StitchNode(PanoramaBase):
 
 
 def main() -> int:
-    """Run the node; frames keep coming while a service call is answered."""
-    return run(StitchNode, threads=2)
+    """Run the node."""
+    return run(StitchNode)
