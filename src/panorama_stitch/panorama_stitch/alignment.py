@@ -9,11 +9,10 @@ from math import ceil, floor, radians
 
 import cv2
 import numpy as np
-from fisheye_geometry.surface import Surface
 
 from panorama_stitch.correlation import less_chance
 from panorama_stitch.pose import Pose
-from panorama_stitch.structure import Reduced
+from panorama_stitch.structure import Facing
 from panorama_stitch.tiles import Tiles
 
 _FEWEST_TILES = 3
@@ -23,56 +22,46 @@ _STRIDE = 2
 """Every second pixel is enough to correlate two smooth pictures."""
 
 
-def align(
-    left: Reduced,
-    right: Reduced,
-    surface: Surface,
-    start: Pose,
-    level_y_px: float,
-    search_rad: float,
-    tilt: bool = True,
-) -> Pose:
+def align(facing: Facing, start: Pose, search_deg: float, tilt: bool) -> Pose:
     """Refine a pose; the one that was given where the overlap does not tell a better one.
 
     Parameters
     ----------
-    left, right
-        The two pictures at the same scale.
-    surface
-        The right one's.
+    facing
+        The pictures.
     start
         The pose to refine, px of these pictures.
-    level_y_px
-        Vertical offset of a level rig.
-    search_rad
+    search_deg
         How far from where it is expected each tile of the overlap is looked for.
     tilt
         Whether the right camera may be turned.
     """
-    tiles = Tiles(left, right, surface, start, level_y_px, search_rad, tilt)
+    search_rad = radians(search_deg)
+    tiles = Tiles(facing, start, search_rad, tilt)
     if len(tiles) < _FEWEST_TILES:
         return start
     pose = start.moved(tiles.climb(tiles.search()))
     shift = max(abs(pose.x_px - start.x_px), abs(pose.y_px - start.y_px))
-    steep = max(abs(pose.pitch_rad), abs(pose.roll_rad)) > _STEEPEST_RAD
-    return start if steep or shift > search_rad * surface.focal_px else pose
+    too_far = shift > search_rad * facing.surface.focal_px
+    too_steep = max(abs(pose.pitch_rad), abs(pose.roll_rad)) > _STEEPEST_RAD
+    return start if too_far or too_steep else pose
 
 
-def certainty(left: Reduced, right: Reduced, surface: Surface, pose: Pose) -> float:
-    """Correlate the overlap at a pose, less what chance gives an overlap of that size; 0 to 1."""
+def certainty(facing: Facing, pose: Pose) -> float:
+    """Correlate the overlap of two structures at a pose, less what chance may give; 0 to 1."""
+    left, right = facing.left, facing.right
     height, width = right.image.shape
     x0 = max(0, floor(-pose.x_px) - _STRIDE)
     x1 = min(width, ceil(left.image.shape[1] - pose.x_px) + _STRIDE)
-    y, x = np.mgrid[0:height:_STRIDE, x0:x1:_STRIDE]
+    part = slice(0, height, _STRIDE), slice(x0, max(x1, x0), _STRIDE)
+    y, x = np.mgrid[part]
     if not x.size:
         return 0.0
-    places = pose.place(surface, np.stack([x.ravel(), y.ravel()], axis=-1).astype(float))
-    map_x, map_y = places.astype(np.float32).T.reshape(2, *x.shape)
-    mine = right.image[0:height:_STRIDE, x0:x1:_STRIDE]
-    theirs = cv2.remap(left.image, map_x, map_y, cv2.INTER_LINEAR)
-    seen = cv2.remap(left.valid, map_x, map_y, cv2.INTER_NEAREST)
-    seen = (seen & right.valid[0:height:_STRIDE, x0:x1:_STRIDE]) > 0
-    mine, theirs = mine[seen], theirs[seen]
+    points = np.stack([x.ravel(), y.ravel()], axis=-1).astype(float)
+    places = pose.place(facing.surface, points).astype(np.float32).reshape(*x.shape, 2)
+    theirs = cv2.remap(left.image, places, None, cv2.INTER_LINEAR)
+    seen = cv2.remap(left.valid, places, None, cv2.INTER_NEAREST) & right.valid[part]
+    theirs, mine = theirs[seen > 0], right.image[part][seen > 0]
     energy = float(np.sqrt((mine @ mine) * (theirs @ theirs)))
     correlation = float(mine @ theirs) / max(energy, 1.0)
     area = _STRIDE * _STRIDE

@@ -5,71 +5,102 @@ registration in the Fourier domain", IEEE TIP 21(5), 2012, doi 10.1109/TIP.2011.
 structures have no mean to subtract.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
-from panorama_stitch.structure import Reduced
+from panorama_stitch.structure import Facing
 
 _DOUBT = 6.0
-"""How far chance carries the correlation of n pixels is about this over sqrt(n)."""
+"""Chance carries the correlation of n smooth pixels up to about this over sqrt(n)."""
 
 
 @dataclass(frozen=True)
 class Landscape:
-    """Correlation of two structures at every offset of a search range.
+    """How well two structures fit at every offset of a search range.
 
     Attributes
     ----------
     x, y
         (columns,), (rows,) int: offsets of the right structure in the left one, px.
-    correlation
-        (rows, columns) float32, -1 to 1.
     score
-        (rows, columns) float32: `correlation` less what chance may give an overlap of that size.
+        (rows, columns) float32: the correlation less what chance may give so small an overlap.
     """
 
     x: np.ndarray
     y: np.ndarray
-    correlation: np.ndarray
     score: np.ndarray
 
     def peaks(self, count: int, apart_px: int) -> list[tuple[int, int]]:
-        """Give up to `count` indices (row, column) of highest score, `apart_px` columns apart."""
+        """Give up to `count` offsets (x, y) with the highest scores above 0, highest first."""
         score = self.score.copy()
         found = []
         while len(found) < count:
             row, column = np.unravel_index(np.argmax(score), score.shape)
             if score[row, column] <= 0:
                 break
-            found.append((int(row), int(column)))
+            found.append((int(self.x[column]), int(self.y[row])))
             score[:, np.abs(self.x - self.x[column]) <= apart_px] = -1
         return found
 
+    def best_near(self, x: float, y: float, within_px: int) -> tuple[int, int]:
+        """Give the offset (x, y) with the highest score around one."""
+        rows, columns = (
+            np.flatnonzero(np.abs(axis - np.clip(at, axis[0], axis[-1])) <= within_px)
+            for axis, at in ((self.y, y), (self.x, x))
+        )
+        part = self.score[np.ix_(rows, columns)]
+        row, column = np.unravel_index(np.argmax(part), part.shape)
+        return int(self.x[columns[column]]), int(self.y[rows[row]])
+
+    def score_at(self, x: int, y: int) -> float:
+        """Score of an offset of the range."""
+        return float(self.score[y - self.y[0], x - self.x[0]])
+
+    def best_away_from(self, x: float, apart_px: float) -> tuple[float, float]:
+        """Give the highest score, and its x, of the offsets that are not near a column."""
+        away = np.flatnonzero(np.abs(self.x - x) > apart_px)
+        if not len(away):
+            return 0.0, x
+        columns = self.score[:, away].max(axis=0)
+        return max(0.0, float(columns.max())), float(self.x[away[np.argmax(columns)]])
+
 
 def correlate(
-    left: Reduced, right: Reduced, x: range, y: range, min_pixels: int
+    facing: Facing, x: Sequence[int], y: Sequence[int], min_pixels: float
 ) -> Landscape:
-    """Correlate two structures at the offsets `x`, `y`; fewer common pixels score -1."""
-    shape = tuple(
-        cv2.getOptimalDFTSize(max(a, b) + max(map(abs, (*offsets, 0))))
-        for a, b, offsets in zip(left.image.shape, right.image.shape, (y, x), strict=True)
-    )
+    """Correlate two structures at the offsets `x`, `y`.
+
+    Parameters
+    ----------
+    facing
+        The structures.
+    x, y
+        Consecutive offsets, px of the structures.
+    min_pixels
+        Offsets at which they share fewer score -1.
+    """
     rows, columns = np.asarray(y), np.asarray(x)
+    shape = tuple(
+        cv2.getOptimalDFTSize(max(a, b) + int(np.abs(offsets).max()))
+        for a, b, offsets in zip(
+            facing.left.image.shape, facing.right.image.shape, (rows, columns), strict=True
+        )
+    )
     spot = np.ix_(rows % shape[0], columns % shape[1])
     (l, l2, l1), (r, r2, r1) = (
-        [_spectrum(image, shape) for image in (s.image, s.image * s.image, s.valid)]
-        for s in (left, right)
+        [_spectrum(image, shape) for image in (one.image, one.image * one.image, one.valid)]
+        for one in (facing.left, facing.right)
     )
     both, left_energy, right_energy, pixels = (
         cv2.dft(cv2.mulSpectrums(a, b, 0, conjB=True), flags=cv2.DFT_INVERSE | cv2.DFT_SCALE)[spot]
         for a, b in ((l, r), (l2, r1), (l1, r2), (l1, r1))
     )
     energy = np.sqrt(np.maximum(left_energy, 0) * np.maximum(right_energy, 0))
-    correlation = both / np.maximum(energy, 1.0)
-    score = np.where(pixels >= min_pixels, less_chance(correlation, energy, pixels), -1.0)
-    return Landscape(columns, rows, correlation, score)
+    score = less_chance(both / np.maximum(energy, 1.0), energy, pixels)
+    return Landscape(columns, rows, np.where(pixels >= min_pixels, score, np.float32(-1)))
 
 
 def less_chance(correlation, energy, pixels):

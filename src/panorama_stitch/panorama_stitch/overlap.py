@@ -6,30 +6,21 @@ the overlap tile by tile, and the winner is refined to a fraction of a pixel.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import degrees, nan, radians
+from math import degrees, isnan, nan, radians
 
 import cv2
 import numpy as np
-
 from fisheye_geometry.errors import OverlapError
 from fisheye_geometry.remap import LEVEL, Turn
 from fisheye_geometry.settings import setting
 from fisheye_geometry.surface import Surface
+
 from panorama_stitch import paper
-from panorama_stitch.alignment import align, certainty
-from panorama_stitch.correlation import Landscape, correlate
-from panorama_stitch.particles import Particle, facing_halves
-from panorama_stitch.pose import Pose
-from panorama_stitch.structure import plain, structure
+from panorama_stitch.particles import Particle
+from panorama_stitch.registration import Registration, Search, register
 
 METHODS = ('particles', 'correlation', 'paper')
 
-_SEARCH_PX_PER_DEG, _FINE_PX_PER_DEG = 2.0, 4.0
-_SEARCH_DEG, _FINE_DEG = 3.2, 0.8
-_CANDIDATES = 8
-_CLOSE = 0.1
-_APART_DEG = 3.0
-"""Offsets nearer to each other are the same answer."""
 _FOCAL_TOLERANCE = 1e-3
 """Relative difference of the focal lengths that moves a whole picture by less than a pixel."""
 
@@ -45,7 +36,7 @@ class OverlapSettings:
         choices=METHODS, live=True,
     )
     min_confidence: float = setting(
-        0.35, 'confidence below which two views count as having no common scene',
+        0.38, 'confidence below which two views count as having no common scene',
         minimum=0.0, maximum=1.0, live=True,
     )
     expected_yaw_deg: float = setting(
@@ -196,107 +187,145 @@ class _Measurement:
     """One pair of pictures, measured."""
 
     def __init__(self, left, right, surface_left, surface_right, settings):
+        self._left, self._right = _grey(left), _grey(right)
         self._surfaces = surface_left, surface_right
         self._settings = settings
-        self._pictures = _grey(left), _grey(right)
-        self._left, self._right = facing_halves(*self._pictures)
-        self._left_start = surface_left.width - self._left.shape[1]
-        self._px_per_deg = surface_left.focal_px * radians(1)
-        self._level_y = surface_left.center_y_px - surface_right.center_y_px
+        self._half_start = surface_left.width - surface_left.width // 2
+        self._level_x = surface_left.center_x_px - surface_right.center_x_px
 
     def run(self, method: str) -> Overlap:
         if method == 'paper':
             return self._by_paper()
-        return self._by_structure(method)
+        search = Search(
+            x_px=self._expected(),
+            max_rise_deg=self._settings.max_rise_deg,
+            min_overlap_deg=self._settings.min_overlap_deg,
+            tilt=self._settings.correct_tilt and self._surfaces[1].turns_are_shifts,
+            min_confidence=self._settings.min_confidence,
+        )
+        by_particles = method == 'particles'
+        found = register(
+            self._left, self._right, *self._surfaces, search, by_particles=by_particles
+        )
+        if found.confidence < self._settings.min_confidence:
+            return self._not_found(method, found)
+        return self._found(found)
 
     def _by_paper(self) -> Overlap:
         s = self._settings
-        left, right, match = paper.measure_by_paper(
-            *self._pictures, classes=s.paper_classes, opening=s.paper_opening_px,
+        left, right, match = paper.find_match(
+            self._left, self._right, classes=s.paper_classes, opening=s.paper_opening_px,
             erosions=s.paper_erosions,
         )
         if match is None:
-            return replace(
-                self._side_by_side('paper', 0.0, 'no similar particles: the views stay side by side'),
-                left_particles=left, right_particles=right,
-            )
-        x = paper.paper_offset(self._surfaces[0].width, left[match.left], right[match.right])
+            message = 'no similar particles: the views stay whole, side by side'
+            aside = side_by_side(self._surfaces[0], 'paper', message)
+            return replace(aside, left_particles=left, right_particles=right)
+        width = self._surfaces[0].width
+        x = paper.offset_x(width, left[match.left], right[match.right])
         return Overlap(
-            method='paper', found=True, offset_x_px=x, offset_y_px=0.0,
-            overlap_px=max(0.0, self._surfaces[0].width - x),
+            method='paper',
+            found=True,
+            offset_x_px=x,
+            offset_y_px=0.0,
+            overlap_px=max(0.0, width - x),
             min_correlation_value=match.min_correlation_value,
-            left_particles=left, right_particles=right,
-            left_match=match.left, right_match=match.right,
+            left_particles=left,
+            right_particles=right,
+            left_match=match.left,
+            right_match=match.right,
             message=f'the most similar particles put the right view at {x:.0f} px',
         )
 
-    def _by_structure(self, method: str) -> Overlap:
-        step = self._step(_SEARCH_PX_PER_DEG)
-        left, right = structure(self._left, step), structure(self._right, step)
-        landscape = self._search(left, right, step)
-        peaks = landscape.peaks(_CANDIDATES, round(_APART_DEG * self._px_per_deg / step))
-        method = 'correlation'
-        if not peaks:
-            return self._side_by_side(method, 0.0, 'the views show no common structure')
-        surface = self._reduced_surface(right, step)
-        level = self._level_y / step
-        best, confidence = None, -1.0
-        for row, column in peaks:
-            if landscape.score[row, column] < landscape.score[peaks[0]] - _CLOSE:
-                continue
-            start = Pose(float(landscape.x[column]), float(landscape.y[row]))
-            pose = align(left, right, surface, start, level, radians(_SEARCH_DEG), self._settings.correct_tilt)
-            for one in (start, pose):
-                sure = certainty(left, right, surface, one)
-                if sure > confidence:
-                    best, confidence = one, sure
-        if confidence < self._settings.min_confidence:
-            return self._side_by_side(method, confidence, 'no common scene')
-        fine = self._step(_FINE_PX_PER_DEG)
-        views = plain(self._left, fine), plain(self._right, fine)
-        pose = align(
-            *views, self._reduced_surface(views[1], fine), best.scaled(step / fine), self._level_y / fine,
-            radians(_FINE_DEG), self._settings.correct_tilt,
-        ).scaled(fine)
-        x = pose.x_px + self._left_start
-        return Overlap(
-            method=method, found=True, offset_x_px=x, offset_y_px=pose.y_px,
-            turn=pose.turn, overlap_px=self._surfaces[0].width - x,
-            confidence=confidence,
-            message=f'found {x:.1f} px; pitch {degrees(pose.pitch_rad):.2f}',
+    def _expected(self) -> tuple[float, float]:
+        """Offsets of the facing halves, px, that the rig's geometry allows."""
+        s = self._settings
+        if isnan(s.expected_yaw_deg) or not self._surfaces[0].turns_are_shifts:
+            return Search.x_px
+        first = self._level_x - self._half_start
+        return tuple(
+            first + self._surfaces[0].focal_px * radians(s.expected_yaw_deg + by)
+            for by in (-s.yaw_tolerance_deg, s.yaw_tolerance_deg)
         )
 
-    def _step(self, px_per_deg: float) -> int:
-        return max(1, round(self._px_per_deg / px_per_deg))
-
-    def _search(self, left, right, step) -> Landscape:
-        rise = round(self._settings.max_rise_deg * self._px_per_deg / step)
-        level = round(self._level_y / step)
-        narrowest = round(self._settings.min_overlap_deg * self._px_per_deg / step)
-        y = range(level - rise, level + rise + 1)
-        x = range(narrowest - right.image.shape[1], left.image.shape[1] - narrowest + 1)
-        return correlate(left, right, x, y, min_pixels=narrowest * left.image.shape[0] // 4)
-
-    def _reduced_surface(self, right, step) -> Surface:
-        height, width = right.image.shape
-        s = self._surfaces[1]
+    def _found(self, found: Registration) -> Overlap:
+        x, y = found.pose.x_px + self._half_start, found.pose.y_px
+        overlap = Overlap(
+            method='correlation',
+            found=True,
+            offset_x_px=x,
+            offset_y_px=y,
+            turn=found.pose.turn,
+            overlap_px=max(0.0, min(self._surfaces[0].width - x, self._surfaces[1].width)),
+            confidence=found.confidence,
+            message=self._describe(found),
+        )
+        if found.proposals is None:
+            return overlap
+        left, right = found.proposals.left, found.proposals.right
+        n, m = found.proposals.match_at(found.pose.x_px, y)
         return replace(
-            s, width=width, height=height, focal_px=s.focal_px / step,
-            center_x_px=(s.center_x_px + 0.5) / step - 0.5,
-            center_y_px=(s.center_y_px + 0.5) / step - 0.5,
+            overlap,
+            method='particles',
+            left_particles=left,
+            right_particles=right,
+            left_match=n,
+            right_match=m,
+            min_correlation_value=(
+                float(paper.mean_differences(left[n : n + 1], right[m : m + 1])[0, 0])
+                if n >= 0 else nan
+            ),
         )
 
-    def _side_by_side(self, method, confidence, message) -> Overlap:
-        return Overlap(
-            method=method, found=False, offset_x_px=float(self._surfaces[0].width),
-            offset_y_px=0.0, confidence=float(np.clip(confidence, 0, 1)), message=message,
-        )
+    def _not_found(self, method, found) -> Overlap:
+        needed = self._settings.min_confidence
+        message = f'no common scene: confidence {found.confidence:.2f}, {needed:.2f} is needed'
+        if found.rival_x_px is not None:
+            here, there = (self._where(x) for x in (found.pose.x_px, found.rival_x_px))
+            message = (
+                f'the scene repeats itself: {here} and {there} fit alike; set expected_yaw_deg or '
+                'show the cameras something unique'
+            )
+        aside = side_by_side(self._surfaces[0], method, message)
+        return replace(aside, confidence=found.confidence)
+
+    def _describe(self, found: Registration) -> str:
+        pose = found.pose
+        parts = [f'the right view begins at {self._where(pose.x_px)}']
+        rise = pose.y_px - (self._surfaces[0].center_y_px - self._surfaces[1].center_y_px)
+        if abs(rise) >= 0.5:
+            parts.append(f'{abs(rise):.1f} px {"lower" if rise > 0 else "higher"} than level')
+        pitch, roll = degrees(pose.pitch_rad), degrees(pose.roll_rad)
+        if max(abs(pitch), abs(roll)) >= 0.05:
+            parts.append(f'its camera pitched by {pitch:.2f} and rolled by {roll:.2f} degrees')
+        parts.append(f'confidence {found.confidence:.2f}')
+        if found.rival_x_px is not None:
+            parts.append(f'though {self._where(found.rival_x_px)} fits nearly as well')
+        return ', '.join(parts)
+
+    def _where(self, x_px: float) -> str:
+        """Offset of a facing half in words: px of the frame, and degrees where there are any."""
+        text = f'{x_px + self._half_start:.1f} px'
+        if not self._surfaces[0].turns_are_shifts:
+            return text
+        turned = (x_px + self._half_start - self._level_x) / self._surfaces[0].focal_px
+        return f'{text} ({degrees(turned):.2f} degrees)'
 
 
-def _grey(picture):
+def side_by_side(surface_left: Surface, method: str, message: str) -> Overlap:
+    """Give the overlap of views that share nothing: whole, one beside the other."""
+    return Overlap(
+        method=method, found=False, offset_x_px=float(surface_left.width), offset_y_px=0.0,
+        message=message,
+    )
+
+
+def _grey(picture: np.ndarray) -> np.ndarray:
+    """Give a grey picture (height, width), still 0 exactly where nothing is seen."""
     if picture.ndim == 2:
         return picture
     if picture.shape[2] == 1:
         return picture[..., 0]
-    # What is seen stays seen: (1, 0, 0) must not turn black.
-    return np.maximum(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), picture.max(axis=2) > 0)
+    grey = cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
+    # A dark pixel that is seen, (1, 0, 0), must not become 0.
+    return np.maximum(grey, picture.max(axis=2) > 0)

@@ -52,7 +52,7 @@ def match_particles(left: Sequence[Particle], right: Sequence[Particle]) -> Part
     return ParticleMatch(int(n), int(m), float(differences[n, m]))
 
 
-def paper_offset(left_width: int, left: Particle, right: Particle) -> float:
+def offset_x(left_width: int, left: Particle, right: Particle) -> float:
     """Give the column of the left frame at which the right frame goes, px.
 
     The average of the two centres of mass beside the part of the left frame that faces away.
@@ -61,7 +61,7 @@ def paper_offset(left_width: int, left: Particle, right: Particle) -> float:
     return float(remaining + int((left.center_x + right.center_x) / 2))
 
 
-def measure_by_paper(left: np.ndarray, right: np.ndarray, *, classes, opening, erosions):
+def find_match(left: np.ndarray, right: np.ndarray, *, classes, opening, erosions):
     """Run the published procedure on two grey frames: both sides' particles and their match."""
     sides = [
         paper_particles(half, classes=classes, opening=opening, erosions=erosions)

@@ -93,7 +93,9 @@ def remove_small(binary: np.ndarray, erosions: int = 9) -> np.ndarray:
     return kept[labels]
 
 
-def analyse(binary: np.ndarray, scale: float = 1.0) -> tuple[Particle, ...]:
+def analyse(
+    binary: np.ndarray, scale: float = 1.0, *, smallest_px: int = 1, most: int | None = None
+) -> tuple[Particle, ...]:
     """Measure the ten properties of every particle (8-connected area of ones).
 
     Parameters
@@ -102,19 +104,32 @@ def analyse(binary: np.ndarray, scale: float = 1.0) -> tuple[Particle, ...]:
         (height, width) uint8, 0 or 1.
     scale
         Size of its pixels, in those of the picture that the properties are meant for.
+    smallest_px
+        Area below which a particle is left out, px of `binary`.
+    most
+        How many to give at most, the largest; None: all.
+
+    Returns
+    -------
+    tuple of Particle
+        From top to bottom; where `most` was given, by size.
     """
-    count, labels, stats, centers = cv2.connectedComponentsWithStats(binary, connectivity=8)
+    _, labels, stats, centers = cv2.connectedComponentsWithStats(binary, connectivity=8)
+    areas = stats[1:, cv2.CC_STAT_AREA]
+    chosen = np.flatnonzero(areas >= smallest_px) + 1
+    if most is not None:
+        chosen = chosen[np.argsort(-areas[chosen - 1], kind='stable')[:most]]
     percent = 100.0 / max(binary.size, 1)
     particles = []
-    for label in range(1, count):
+    for label in chosen:
         left, top, width, height, area = map(int, stats[label])
         first = left + int(np.argmax(labels[top, left : left + width] == label))
-        center_x, center_y = (float(c + 0.5) * scale - 0.5 for c in centers[label])
+        center_x, center_y = (float(center + 0.5) * scale - 0.5 for center in centers[label])
+        lengths = (first, top, left, top, left + width, top + height)
         particles.append(
             Particle(
-                center_x, center_y, first * scale, top * scale, left * scale, top * scale,
-                (left + width) * scale, (top + height) * scale,
-                area * scale * scale, area * percent,
+                center_x, center_y, *(float(length * scale) for length in lengths),
+                float(area * scale * scale), area * percent,
             )
         )
     return tuple(particles)

@@ -1,87 +1,116 @@
 """Offsets that particles propose: what looks alike in both pictures votes for its shift.
 
-Only properties that stay under the shift count (area, size, height of the centre); where a particle
-lies does not.
+Particles are looked for in the structure of the pictures, at several thresholds and in both
+polarities, so that exposure does not matter. Only properties that a shift leaves alone tell what
+is alike (area, width, height, and how high it lies), not where it lies or how an edge cuts it.
 """
 
-from collections.abc import Sequence
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
+from panorama_stitch.correlation import Landscape
 from panorama_stitch.particles import Particle, analyse
-from panorama_stitch.structure import Structure
+from panorama_stitch.structure import Facing
 
 _LEVELS = (0.6, 1.2)
-"""Thresholds in local contrast, bright above and dark below zero."""
-_SMALLEST_PX = 3
-_LARGEST_SHARE = 0.1
+"""Thresholds of the structure, for bright particles; dark ones lie below their negatives."""
+_SMALLEST_PX = 4
+_MOST = 60
+"""Particles a threshold, the largest ones."""
+_UNLIKE = 0.8
+"""Pairs whose area, width and height differ by more in their logarithms are not tried."""
+_SHARPNESS = 4.0
+_CLUSTER_PX = 5
+"""Shifts this near to each other vote for the same offset."""
 
 
-def find_particles(view: Structure, scale: float) -> list[tuple[Particle, ...]]:
-    """Find the particles of a structure at several thresholds and both polarities.
+@dataclass(frozen=True)
+class Proposals:
+    """Particles of two facing halves, and which of them may be the same thing.
 
-    Returns
-    -------
-    list of tuple of Particle
-        One tuple a threshold, in px of a picture `scale` times as large.
-    """
-    return [
-        _of_fair_size(analyse((sign * view.detail > level).astype(np.uint8), scale), scale)
-        for level in _LEVELS
-        for sign in (1, -1)
-    ]
-
-
-def _of_fair_size(particles, scale):
-    return tuple(
-        p for p in particles
-        if p.area >= _SMALLEST_PX * scale**2 and p.area_percent <= 100 * _LARGEST_SHARE
-    )
-
-
-def pair_up(left: Sequence[Particle], right: Sequence[Particle], rise_px: float):
-    """Find the pairs that may be the same thing.
-
-    Returns
-    -------
-    indices : ndarray
-        (n, 2) of left and right.
-    shifts : ndarray
-        (n, 2) from the right particle's centre to the left one's, px.
-    likeness : ndarray
+    Attributes
+    ----------
+    left, right
+        Particles, px of the unreduced halves.
+    pairs
+        (n, 2) int: indices into both.
+    shifts
+        (n, 2) from the right one's centre to the left one's, px of the structures.
+    likeness
         (n,) 0 to 1.
     """
+
+    left: tuple[Particle, ...]
+    right: tuple[Particle, ...]
+    pairs: np.ndarray
+    shifts: np.ndarray
+    likeness: np.ndarray
+
+    def offsets(self, landscape: Landscape, count: int) -> list[tuple[int, int]]:
+        """Give the `count` offsets (x, y) with most votes, each moved to where it fits best."""
+        votes = np.zeros(landscape.score.shape, np.float32)
+        column, row = np.rint(self.shifts - (landscape.x[0], landscape.y[0])).astype(int).T
+        inside = (row >= 0) & (row < votes.shape[0]) & (column >= 0) & (column < votes.shape[1])
+        np.add.at(votes, (row[inside], column[inside]), self.likeness[inside])
+        votes = cv2.blur(votes, (_CLUSTER_PX, _CLUSTER_PX), borderType=cv2.BORDER_CONSTANT)
+        chosen = Landscape(landscape.x, landscape.y, votes).peaks(count, _CLUSTER_PX)
+        return list(dict.fromkeys(landscape.best_near(*one, _CLUSTER_PX // 2) for one in chosen))
+
+    def match_at(self, x: float, y: float) -> tuple[int, int]:
+        """Give the pair (left, right) that fits an offset best, (-1, -1) where none does."""
+        miss = np.abs(self.shifts - (x, y)).max(axis=1, initial=0.0)
+        fits = np.flatnonzero(miss <= _CLUSTER_PX / 2)
+        if not len(fits):
+            return -1, -1
+        area = np.array([self.left[n].area for n in self.pairs[fits, 0]])
+        best = fits[np.argmax(self.likeness[fits] * np.sqrt(area))]
+        return int(self.pairs[best, 0]), int(self.pairs[best, 1])
+
+
+def propose(facing: Facing, max_rise_px: float) -> Proposals:
+    """Find the particles of two structures and pair up those that may be the same thing."""
+    sides = [], []
+    pairs, likeness, first = [], [], (0, 0)
+    level_y_px = facing.level_y_px * facing.step
+    for level in _LEVELS:
+        for sign in (1, -1):
+            found = [
+                analyse(
+                    (sign * one.image > level).view(np.uint8), facing.step,
+                    smallest_px=_SMALLEST_PX, most=_MOST,
+                )
+                for one in (facing.left, facing.right)
+            ]
+            indices, alike = _pair_up(*found, level_y_px, max_rise_px * facing.step)
+            pairs.append(indices + first)
+            likeness.append(alike)
+            for side, particles in zip(sides, found):
+                side.extend(particles)
+            first = tuple(map(len, sides))
+    left, right = map(tuple, sides)
+    pairs = np.concatenate(pairs)
+    centers = [
+        np.array([(p.center_x, p.center_y) for p in particles]).reshape(-1, 2)
+        for particles in sides
+    ]
+    shifts = (centers[0][pairs[:, 0]] - centers[1][pairs[:, 1]]) / facing.step
+    return Proposals(left, right, pairs, shifts, np.concatenate(likeness))
+
+
+def _pair_up(left, right, level_y_px, max_rise_px):
+    """Pairs (n, 2) of like particles at like heights, and how alike they are (n,)."""
     if not (left and right):
-        return np.zeros((0, 2), int), np.zeros((0, 2)), np.zeros(0)
-    a, b = (_shape(particles) for particles in (left, right))
-    difference = np.abs(a[:, None, 2:] - b[None, :, 2:]).sum(axis=2)
-    rise = a[:, None, 1] - b[None, :, 1]
-    indices = np.argwhere((np.abs(rise) <= rise_px) & (difference < 1.0))
-    n, m = indices.T
-    return indices, a[n, :2] - b[m, :2], np.exp(-3 * difference[n, m])
-
-
-def _shape(particles):
-    """Centre, and the logarithms of area, width and height: (n, 5)."""
-    return np.array([
-        (p.center_x, p.center_y, *np.log([p.area, p.right - p.left, p.bottom - p.top]))
-        for p in particles
-    ])
-
-
-def vote(shifts: np.ndarray, likeness: np.ndarray, cell_px: float, count: int) -> np.ndarray:
-    """Cluster proposed shifts (n, 2) and give the `count` places (k, 2) with most votes, px."""
-    if not len(shifts):
-        return np.zeros((0, 2))
-    low = shifts.min(axis=0) - 2 * cell_px
-    cells = np.floor((shifts - low) / cell_px).astype(int)
-    votes = np.zeros(cells.max(axis=0) + 3, np.float32)
-    np.add.at(votes, tuple(cells.T), likeness)
-    votes = cv2.blur(votes, (3, 3), borderType=cv2.BORDER_CONSTANT)
-    places = []
-    while len(places) < count and votes.max() > 0:
-        i, j = np.unravel_index(np.argmax(votes), votes.shape)
-        places.append(low + (np.array([i, j]) + 0.5) * cell_px)
-        votes[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2] = 0
-    return np.array(places)
+        return np.zeros((0, 2), int), np.zeros(0)
+    (height, shape), (other_height, other) = (
+        (
+            np.array([p.center_y for p in particles]),
+            np.log([(p.area, p.right - p.left, p.bottom - p.top) for p in particles]),
+        )
+        for particles in (left, right)
+    )
+    difference = np.abs(shape[:, None] - other[None]).sum(axis=2)
+    rise = np.abs(height[:, None] - other_height[None] - level_y_px)
+    pairs = np.argwhere((difference <= _UNLIKE) & (rise <= max_rise_px))
+    return pairs, np.exp(-_SHARPNESS * difference[tuple(pairs.T)])

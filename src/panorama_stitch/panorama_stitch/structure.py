@@ -1,25 +1,30 @@
 """What a picture has to hold on to: edges and texture, with exposure and smooth areas removed.
 
 Correlating the pictures themselves says 0.9 for two views that share nothing but a bright ceiling
-over a dark floor. Here only what changes along a row within a few pixels counts, equally in bright
+over a dark floor. Here only what changes along a row within a few degrees counts, equally in bright
 and in dark places; a horizon, which fits at every offset, and mere noise count for little.
 """
 
-from dataclasses import dataclass
-from math import ceil
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import ceil, radians
 
 import cv2
 import numpy as np
+from fisheye_geometry.surface import Surface
+
+from panorama_stitch.particles import facing_halves
 
 _RIM_PX = 2
 """The edge of what a lens sees is half dark."""
+_FINE_SMOOTHING_PX = 1.0
 _SMOOTHING_PX = 1.4
 _WINDOW_PX = 25
 """What changes more slowly along a row than over this width is no structure."""
 _NEIGHBOURHOOD_PX = 49
 """Contrast is made equal over squares of this size."""
 _NOISE_LEVEL = 3.0
-"""Contrast below it is not raised, grey levels after reduction."""
+"""Contrast below it is not raised, grey levels."""
 
 
 @dataclass(frozen=True)
@@ -38,27 +43,74 @@ class Reduced:
     valid: np.ndarray
 
 
+@dataclass(frozen=True)
+class Facing:
+    """The facing halves of a pair of pictures, reduced by `step`.
+
+    Attributes
+    ----------
+    left, right
+        The halves.
+    surface
+        What the right one shows.
+    level_y_px
+        Vertical offset of the right half in the left one if the rig is level.
+    step
+        Pixels of the pictures to one of these.
+    """
+
+    left: Reduced
+    right: Reduced
+    surface: Surface
+    level_y_px: float
+    step: int
+
+
+def face(
+    left: np.ndarray,
+    right: np.ndarray,
+    surface_left: Surface,
+    surface_right: Surface,
+    px_per_deg: float,
+    how: Callable[[np.ndarray, int], Reduced],
+) -> Facing:
+    """Reduce the facing halves of two grey pictures to about `px_per_deg`, never enlarging."""
+    step = max(1, round(surface_right.focal_px * radians(1) / px_per_deg))
+    halves = [how(half, step) for half in facing_halves(left, right)]
+    height, width = halves[1].image.shape
+    surface = replace(
+        surface_right,
+        width=width,
+        height=height,
+        focal_px=surface_right.focal_px / step,
+        center_x_px=(surface_right.center_x_px + 0.5) / step - 0.5,
+        center_y_px=(surface_right.center_y_px + 0.5) / step - 0.5,
+    )
+    level_y_px = (surface_left.center_y_px - surface_right.center_y_px) / step
+    return Facing(*halves, surface, level_y_px, step)
+
+
 def structure(picture: np.ndarray, step: int) -> Reduced:
-    """Find the structure of a picture (height, width) uint8, reduced to 1 / `step` in size."""
+    """Find the structure of a picture (height, width) uint8, reduced by `step`."""
     picture, valid = _reduce(picture, step)
     weight = valid.astype(np.float32)
     smooth = _average(picture * weight, weight, cv2.GaussianBlur, (0, 0), _SMOOTHING_PX)
-    detail = smooth - _trend(smooth * weight, weight)
-    detail *= weight
+    detail = (smooth - _trend(smooth * weight, weight)) * weight
     square = (_NEIGHBOURHOOD_PX, _NEIGHBOURHOOD_PX)
     contrast = _average(detail * detail, weight, cv2.blur, square)
-    return Reduced(detail * weight / np.sqrt(contrast + _NOISE_LEVEL**2), valid)
+    return Reduced(detail / np.sqrt(contrast + _NOISE_LEVEL**2), valid)
 
 
 def plain(picture: np.ndarray, step: int) -> Reduced:
-    """Give a picture itself, reduced and a little smoothed."""
+    """Reduce a picture (height, width) uint8 by `step` and smooth it a little."""
     picture, valid = _reduce(picture, step)
     weight = valid.astype(np.float32)
-    return Reduced(_average(picture * weight, weight, cv2.GaussianBlur, (0, 0), 1.0) * weight, valid)
+    smooth = _average(picture * weight, weight, cv2.GaussianBlur, (0, 0), _FINE_SMOOTHING_PX)
+    return Reduced(smooth * weight, valid)
 
 
 def _reduce(picture, step):
-    """Reduce a picture to float32, and tell which pixels are made of valid ones only."""
+    """Reduce a picture to float32, and tell which pixels are made of seen ones only."""
     height, width = (side // step for side in picture.shape)
     picture = picture[: height * step, : width * step]
     seen = cv2.compare(picture, 0, cv2.CMP_GT)
@@ -69,17 +121,24 @@ def _reduce(picture, step):
         )
     rim = 2 * ceil(_RIM_PX / step) + 1
     valid = cv2.erode(
-        (seen == 255).astype(np.uint8), np.ones((rim, rim), np.uint8),
-        borderType=cv2.BORDER_CONSTANT, borderValue=0,
+        (seen == 255).astype(np.uint8),
+        np.ones((rim, rim), np.uint8),
+        borderType=cv2.BORDER_CONSTANT,
+        borderValue=0,
     )
     return picture.astype(np.float32), valid
+
+
+def _average(image, weight, smooth, *how):
+    """Smooth what is seen alone: `image` is 0 where `weight` is."""
+    return smooth(image, *how) / (smooth(weight, *how) + 1e-6)
 
 
 def _trend(image, weight):
     """Fit a line to what is seen of each row around each pixel.
 
-    At the rim, where a window has one side only, a mere mean would take the falling light for
-    structure, and rims would match rims.
+    At the rim, where a window has one side only, a mere mean would take the light that falls off
+    there for structure, and rims would match rims.
     """
     x = np.arange(image.shape[1], dtype=np.float32) - image.shape[1] / 2
     total, mean_x, square_x, mean, product = (
@@ -92,8 +151,3 @@ def _trend(image, weight):
     spread = square_x / total - mean_x * mean_x
     slope = (product / total - mean_x * mean) / (spread + 1.0)
     return mean + slope * (x - mean_x)
-
-
-def _average(image, weight, smooth, *how):
-    """Smooth what is seen alone: `image` is 0 where `weight` is."""
-    return smooth(image, *how) / (smooth(weight, *how) + 1e-6)

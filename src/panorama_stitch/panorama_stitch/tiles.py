@@ -5,13 +5,13 @@ from math import ceil, inf, radians
 
 import cv2
 import numpy as np
-from fisheye_geometry.surface import Surface
 
 from panorama_stitch.pose import Pose
-from panorama_stitch.structure import Reduced
+from panorama_stitch.structure import Facing
 
 _TILE_RAD = radians(6.0)
 _SMALLEST_TILE_PX = 12
+_SHORTEST_REACH_PX = 4
 _COLUMNS, _ROWS = 4, 18
 """At most so many tiles across and down the overlap."""
 _SEEN_SHARE = 0.8
@@ -37,35 +37,22 @@ class Tiles:
 
     Parameters
     ----------
-    left, right
-        The two pictures at the same scale.
-    surface
-        The right one's.
+    facing
+        The pictures.
     start
         Where to begin.
-    level_y_px
-        Vertical offset of a level rig.
     search_rad
         How far from where it is expected each tile is correlated.
     tilt
         Whether the right camera may be turned.
     """
 
-    def __init__(
-        self,
-        left: Reduced,
-        right: Reduced,
-        surface: Surface,
-        start: Pose,
-        level_y_px: float,
-        search_rad: float,
-        tilt: bool,
-    ):
+    def __init__(self, facing: Facing, start: Pose, search_rad: float, tilt: bool):
+        surface = facing.surface
         size = max(_SMALLEST_TILE_PX, round(_TILE_RAD * surface.focal_px))
-        self._reach = max(4, ceil(search_rad * surface.focal_px))
-        self._start = start
+        self._reach = max(_SHORTEST_REACH_PX, ceil(search_rad * surface.focal_px))
         self._tilt = tilt
-        origins = _origins(left.valid, right.valid, start, size, self._reach // 3)
+        origins = _origins(facing, start, size, self._reach // 3)
         margin = (size - 1) / 2
         centers = origins + margin
         places = start.place(surface, centers) - margin
@@ -76,30 +63,29 @@ class Tiles:
         fits = np.zeros((len(origins), side, side), np.float32)
         self._known = np.zeros(fits.shape, bool)
         for fit, known, origin, corner in zip(fits, self._known, origins, corners):
-            _correlate(fit, known, left, right.image, origin, corner, size)
+            _correlate(fit, known, facing, origin, corner, size)
         rays = surface.rays(*centers.T)
         # Rows far above and below the horizon are stretched: tiles count by their solid angle.
         solid = (rays[:, [0, 2]] ** 2).sum(axis=1) / (rays**2).sum(axis=1)
         pixels = size * size / _GRAIN_PX * solid[:, None, None]
         self._likelihood = -0.5 * pixels * np.log1p(-((_BEST * fits.clip(0)) ** 2))
-        self._prior = _prior(surface, start, level_y_px, tilt)
+        self._prior = _prior(facing, start, tilt)
 
     def __len__(self) -> int:
         return len(self._likelihood)
 
     def search(self) -> np.ndarray:
         """Find the likeliest step (4,) from the start on a grid of shifts and tilts."""
-        blurred = np.stack([cv2.blur(one, (3, 3)) for one in self._likelihood])
         tilts = product(_TILTS_RAD, repeat=2) if self._tilt else [(0.0, 0.0)]
-        steps = [self._best_shift(blurred, np.array(tilt)) for tilt in tilts]
+        steps = [self._best_shift(np.array(tilt)) for tilt in tilts]
         return max(steps, key=lambda step: step[0])[1]
 
-    def _best_shift(self, likelihood, tilt):
+    def _best_shift(self, tilt):
         """Add up the tiles' maps, each moved by what the tilt does to it."""
         moves = self._center - self._reach + self._jacobian[:, :, 2:] @ tilt
-        side = likelihood.shape[1]
+        side = 2 * self._reach + 1
         total = np.zeros((side, side), np.float32)
-        for one, (dx, dy) in zip(likelihood, moves):
+        for one, (dx, dy) in zip(self._likelihood, moves):
             total += cv2.warpAffine(one, np.array([[1, 0, -dx], [0, 1, -dy]]), (side, side))
         y, x = np.unravel_index(np.argmax(total), total.shape)
         step = np.array([x - self._reach, y - self._reach, *tilt], float)
@@ -155,24 +141,25 @@ class Tiles:
         return slope * known[:, None], curvature * known[:, None, None]
 
 
-def _prior(surface, start, level_y_px, tilt):
+def _prior(facing, start, tilt):
     """How likely a step is before anything is seen: precision (4, 4) and likeliest step (4,)."""
     likely_tilt = _LIKELY_TILT_RAD if tilt else 1e-9
-    deviation = np.array([inf, _LIKELY_RISE_RAD * surface.focal_px, likely_tilt, likely_tilt])
-    usual = np.array([0.0, level_y_px - start.y_px, -start.pitch_rad, -start.roll_rad])
+    deviation = np.array([inf, _LIKELY_RISE_RAD * facing.surface.focal_px, likely_tilt, likely_tilt])
+    usual = np.array([0.0, facing.level_y_px - start.y_px, -start.pitch_rad, -start.roll_rad])
     return np.diag(deviation**-2.0), usual
 
 
-def _origins(left_valid, right_valid, pose, size, inset) -> np.ndarray:
+def _origins(facing, pose, size, inset) -> np.ndarray:
     """Upper left corners (n, 2) of tiles of the right picture that both pictures show."""
+    left, right = facing.left.valid, facing.right.valid
     x, y = round(pose.x_px), round(pose.y_px)
-    (left_height, left_width), (height, width) = left_valid.shape, right_valid.shape
+    (left_height, left_width), (height, width) = left.shape, right.shape
     x0, x1 = max(0, -x) + inset, min(width, left_width - x) - inset
     y0, y1 = max(0, -y), min(height, left_height - y)
     across, down = min(_COLUMNS, (x1 - x0) // size), min(_ROWS, (y1 - y0) // size)
     if across < 1 or down < 1:
         return np.zeros((0, 2), int)
-    both = left_valid[y0 + y : y1 + y, x0 + x : x1 + x] & right_valid[y0:y1, x0:x1]
+    both = left[y0 + y : y1 + y, x0 + x : x1 + x] & right[y0:y1, x0:x1]
     columns = np.linspace(0, x1 - x0 - size, across).astype(int)
     rows = np.linspace(0, y1 - y0 - size, down).astype(int)
     seen = _box_sums(both, size)[np.ix_(rows, columns)]
@@ -180,16 +167,17 @@ def _origins(left_valid, right_valid, pose, size, inset) -> np.ndarray:
     return np.stack([columns[column] + x0, rows[row] + y0], axis=-1)
 
 
-def _correlate(fit, known, left, right, origin, corner, size):
+def _correlate(fit, known, facing, origin, corner, size):
     """Fill in one tile's map: its correlation with each place of the left picture, if all seen."""
     (x0, y0), (x1, y1) = np.maximum(corner, 0), np.maximum(corner + len(fit) - 1 + size, 0)
-    window = left.image[y0:y1, x0:x1]
+    window = facing.left.image[y0:y1, x0:x1]
     if min(window.shape) < size:
         return
     x, y = origin
+    tile = facing.right.image[y : y + size, x : x + size]
+    responses = cv2.matchTemplate(window, tile, cv2.TM_CCOEFF_NORMED)
+    seen = _box_sums(facing.left.valid[y0:y1, x0:x1], size) == size * size
     column, row = (x0, y0) - corner
-    responses = cv2.matchTemplate(window, right[y : y + size, x : x + size], cv2.TM_CCOEFF_NORMED)
-    seen = _box_sums(left.valid[y0:y1, x0:x1], size) == size * size
     part = slice(row, row + len(responses)), slice(column, column + responses.shape[1])
     fit[part] = responses * seen
     known[part] = seen
