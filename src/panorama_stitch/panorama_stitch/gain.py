@@ -17,20 +17,20 @@ from panorama_stitch.view import View
 
 _AROUND_SEAM_DEG = 12.0
 """Width of the overlap in which brightness is compared."""
-_SAMPLES, _FEWEST_SAMPLES = 3000, 100
-_DARK, _BRIGHT = 16, 245
-"""Grey levels beyond which noise and clipping falsify a comparison."""
+_SAMPLES, _FEWEST_SAMPLES = 1500, 50
+_DARK, _BRIGHT, _CLIPPED = 16, 245, 254
+"""Grey levels: noise falsifies what is darker, clipping what is brighter; clipped for sure."""
+_CLIPPED_SHARE = 0.02
+"""Of the samples, from which on white has to stay white."""
 _ALIKE = 1.1
 """Samples that differ by a larger factor, once evened out, show different things."""
-_EVERY = 4
+_EVERY = 8
 """Panoramas from one comparison to the next."""
-_MEDIAN_OF = 5
-_SMOOTHING = 0.2
-"""Share of the way to the median of the comparisons that a factor goes at once."""
-_CLIPPED = 0.02
-"""Share of clipped samples from which on white has to stay white."""
-_SMALLEST_CHANGE = 0.002
-"""Relative; half a grey level at most."""
+_MEDIAN_OF = 3
+_SMOOTHING = 0.25
+"""Share of the way to the median of the last comparisons that a factor goes at once."""
+_SMALLEST_CHANGE, _SMALLEST_TINT = 0.002, 0.01
+"""Factors that differ less from 1 are not worth the time; and from each other."""
 _LARGEST_FACTOR = 4.0
 _ROWS = 64
 """Rows that are multiplied at once by factors that differ between channels."""
@@ -54,7 +54,7 @@ class GainCompensation:
             pair.compare(group)
         # Where nothing is clipped the brighter pictures are darkened, so that nothing will be.
         # Where the sky is, darkened white would be grey, and a change of colour would tint it.
-        is_clipped = any(pair.clipped > _CLIPPED for pair in self._pairs)
+        is_clipped = any(pair.clipped > _CLIPPED_SHARE for pair in self._pairs)
         self._in_color = not is_clipped
         needed = self._needed().mean(axis=1)
         self._reference = int(needed.argmin() if is_clipped else needed.argmax())
@@ -122,15 +122,11 @@ class _Pair:
             view.shown(samples, samples.valid.shape)
             for view, samples in zip(views[index : index + 2], self._samples, strict=True)
         ]
-        self._seen = seen[0] & seen[1]
+        self._seen = (seen[0] & seen[1]).ravel() & (end > begin)
 
     def compare(self, images: Sequence[np.ndarray]) -> None:
         """Learn from pictures, one of each camera."""
-        left, right = (
-            samples(images[self._index + i])[self._seen].reshape(np.count_nonzero(self._seen), -1)
-            for i, samples in enumerate(self._samples)
-        )
-        ratio = self._ratio(left, right)
+        ratio = self._ratio(*(self._planes(i, images[self._index + i]) for i in (0, 1)))
         if ratio is None:
             return
         self._history.append(np.log(ratio))
@@ -138,22 +134,29 @@ class _Pair:
         is_first = len(self._history) == 1
         self.log_ratio = aim if is_first else self.log_ratio + _SMOOTHING * (aim - self.log_ratio)
 
+    def _planes(self, which: int, image: np.ndarray) -> np.ndarray:
+        """(channels, samples) uint8 of one of the two views."""
+        drawn = self._samples[which](image)
+        return np.ascontiguousarray(drawn.reshape(len(self._seen), -1).T)
+
     def _ratio(self, left: np.ndarray, right: np.ndarray) -> np.ndarray | None:
-        """Left over right (channels,) of samples (n, channels) that show the same."""
-        clipped = np.maximum(left, right).max(axis=1) > _BRIGHT
-        self.clipped = float(clipped.mean()) if len(clipped) else 0.0
-        usable = ~clipped & (np.minimum(left, right).min(axis=1) > _DARK)
-        left, right = left[usable].astype(float), right[usable].astype(float)
-        if len(left) < _FEWEST_SAMPLES:
+        """Left over right (channels,) where both show the same, None if hardly any sample does."""
+        brightest = np.maximum(left, right).max(axis=0)
+        darkest = np.minimum(left, right).min(axis=0)
+        usable = self._seen & (brightest < _BRIGHT) & (darkest > _DARK)
+        clipped = np.count_nonzero(self._seen & (brightest >= _CLIPPED))
+        self.clipped = clipped / max(1, np.count_nonzero(self._seen))
+        if np.count_nonzero(usable) < _FEWEST_SAMPLES:
             return None
-        ratios = left.sum(axis=1) / right.sum(axis=1)
-        ratios /= np.median(ratios)
-        alike = (ratios < _ALIKE) & (ratios > 1 / _ALIKE)
-        return left[alike].sum(axis=0) / right[alike].sum(axis=0)
+        left, right = left.astype(np.float32), right.astype(np.float32)
+        ratios = left.sum(axis=0) / np.maximum(right.sum(axis=0), 1)
+        median = np.median(ratios[usable])
+        alike = usable & (ratios < median * _ALIKE) & (ratios > median / _ALIKE)
+        return (left @ alike) / (right @ alike)
 
 
 class _Multiplier:
-    """Multiplies drawn rows, at once where all channels have the same factor."""
+    """Multiplies drawn rows; faster where all channels have the same factor."""
 
     def __init__(self, width: int, channels: int):
         self._weights = np.full((_ROWS, width, channels), 255, np.uint8)
@@ -162,9 +165,9 @@ class _Multiplier:
 
     def set(self, factors: np.ndarray) -> None:
         """Use other factors (channels,)."""
-        self._scale = float(factors.max())
-        weights = np.rint(255 * factors / self._scale).astype(np.uint8)
-        self._is_grey = bool((weights == 255).all())
+        self._is_grey = factors.max() <= factors.min() * (1 + _SMALLEST_TINT)
+        self._scale = float(factors.mean() if self._is_grey else factors.max())
+        weights = np.rint(255 * factors / factors.max()).astype(np.uint8)
         if (weights != self._weights[0, 0]).any():
             self._weights[:] = weights
 

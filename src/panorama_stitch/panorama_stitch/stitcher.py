@@ -14,6 +14,7 @@ from panorama_stitch.compositor import BLENDS, Compositor
 from panorama_stitch.gain import GainCompensation
 from panorama_stitch.layout import lay_out
 from panorama_stitch.overlap import Overlap, measure_overlap
+from panorama_stitch.seam import settle_seams
 from panorama_stitch.settings import PanoramaOutputSettings
 from panorama_stitch.view import View
 
@@ -135,6 +136,7 @@ class Stitcher:
             fade_px=fade_px,
             crop=settings.crop if all(overlap.found for overlap in overlaps) else 'none',
         )
+        layout = settle_seams(layout, views, group)
         gain = GainCompensation(layout, views, group) if settings.gain_compensation else None
         return Compositor(layout, views, settings.blend, gain)
 

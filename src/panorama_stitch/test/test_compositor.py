@@ -1,5 +1,6 @@
 """Layout and composing, against the scene drawn directly on the panorama's surface."""
 
+import tracemalloc
 from dataclasses import replace
 
 import cv2
@@ -11,7 +12,8 @@ from fisheye_geometry.errors import ImageFormatError
 from fisheye_geometry.lens import make_lens
 from fisheye_geometry.remap import Turn
 from fisheye_geometry.surface import surface_for
-from panorama_stitch.compositor import Compositor
+from panorama_stitch.compositor import BLENDS, Compositor
+from panorama_stitch.gain import GainCompensation
 from panorama_stitch.layout import covered, lay_out
 from panorama_stitch.view import View
 
@@ -26,6 +28,8 @@ LENS = make_lens(
     [111.526, 0, 159.5, 0, 111.526, 119.5, 0, 0, 1],
     [-0.02, 0.004, -0.001, 0.0001],
 ).seen_within(np.radians(92))
+SMALL_OBJECTS_BYTES = 20_000
+"""Slices and the like, a fiftieth of a small panorama; they are freed at once."""
 SURFACE = surface_for(LENS)
 OFFSET = YAW * SURFACE.focal_px
 
@@ -77,6 +81,34 @@ def test_a_crop_leaves_no_black_and_keeps_the_field_of_view(pictures, corrected)
     shown_deg = np.degrees(layout.surface.width / layout.surface.focal_px)
     assert shown_deg > 310 - 2 * 3.0
     assert layout.surface.height > 1.8 * layout.surface.focal_px
+
+
+@pytest.mark.parametrize('corrected', [False, True])
+@pytest.mark.parametrize('offset_px', [OFFSET, round(OFFSET)])
+def test_a_crop_leaves_no_black_where_the_right_view_lies_over_the_left(
+    pictures, corrected, offset_px
+):
+    views, images = views_of(pictures, corrected)
+    layout, out = composed(views, images, round(offset_px) if corrected else offset_px, 0.0)
+    assert covered(layout, views).all()
+    assert out.any(axis=2).all()
+
+
+@pytest.mark.parametrize('blend', BLENDS)
+def test_every_blend_shows_the_scene_without_allocating_pictures(pictures, blend):
+    views = [View(LENS, SURFACE)] * 2
+    darker = [pictures[0], (pictures[1] * 0.8).astype(np.uint8)]
+    layout = lay_out(views, [(OFFSET, 0.0)], fade_px=10.0 * BLENDS[blend], crop='valid')
+    compositor = Compositor(layout, views, blend, GainCompensation(layout, views, darker))
+    out = np.empty((layout.surface.height, layout.surface.width, 3), np.uint8)
+    compositor.compose(darker, out)
+    truth = Scene().view(layout.surface, gain=0.8).frame(STAMP_NS)
+    assert psnr(out, truth, np.s_[:]) > FAITHFUL_DB
+    tracemalloc.start()
+    compositor.compose(darker, out)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < SMALL_OBJECTS_BYTES
 
 
 def test_both_ways_give_the_same_picture(pictures):

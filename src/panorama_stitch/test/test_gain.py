@@ -1,0 +1,126 @@
+"""Gain compensation: right, robust, slow enough, and out of the way where it is not needed."""
+
+import numpy as np
+import pytest
+
+from fisheye_capture.scene import Scene
+from fisheye_capture.synthetic import synthetic_lens
+from fisheye_geometry.remap import Turn
+from fisheye_geometry.surface import surface_for
+from panorama_stitch.compositor import Compositor
+from panorama_stitch.gain import GainCompensation
+from panorama_stitch.layout import lay_out
+from panorama_stitch.view import View
+
+YAW = np.radians(140)
+LENS = synthetic_lens(320, 240, np.radians(170))
+SURFACE = surface_for(LENS)
+VIEWS = [View(LENS, SURFACE)] * 2
+LAYOUT = lay_out(VIEWS, [(YAW * SURFACE.focal_px, 0.0)], fade_px=8.0, crop='valid')
+RIGHT = 0.01
+"""A relative error of a factor that costs a grey level in what is bright."""
+UNSEEN_LEVELS = 0.5
+"""A change from one panorama to the next that nobody sees."""
+
+
+def pictures(left=1.0, right=1.0):
+    """Take pictures with different exposures, one number or one for each channel."""
+    return [
+        np.minimum(Scene().view(LENS, Turn(yaw_rad=yaw)).frame(0) * np.asarray(gain), 255).astype(
+            np.uint8
+        )
+        for yaw, gain in ((-YAW / 2, left), (YAW / 2, right))
+    ]
+
+
+@pytest.mark.parametrize(('left', 'right'), [(1.0, 1.3), (1.2, 0.8)])
+def test_the_brighter_camera_is_darkened(left, right):
+    factors = GainCompensation(LAYOUT, VIEWS, pictures(left, right)).factors
+    assert factors[0] / factors[1] == pytest.approx(np.full(3, right / left), rel=RIGHT)
+    assert factors.max() == 1.0
+
+
+def test_where_the_sky_is_clipped_white_stays_white():
+    factors = GainCompensation(LAYOUT, VIEWS, pictures(1.0, 1.8)).factors
+    assert factors[0] == pytest.approx(np.full(3, 1.8), rel=RIGHT)
+    assert (factors[1] == 1.0).all()
+
+
+def test_a_tint_is_taken_out():
+    tint = np.array([0.9, 1.0, 1.08])
+    gain = GainCompensation(LAYOUT, VIEWS, pictures(right=tint))
+    ratio = gain.factors[0] / gain.factors[1]
+    assert ratio == pytest.approx(tint, rel=RIGHT)
+    drawn = np.full((100, LAYOUT.drawn(1)[1] - LAYOUT.drawn(1)[0], 3), 100, np.uint8)
+    gain.apply(1, drawn)
+    assert drawn[0, 0] == pytest.approx(100 * gain.factors[1], abs=1)
+    assert (drawn == drawn[0, 0]).all()
+
+
+def test_what_one_camera_shows_alone_does_not_count():
+    images = pictures(1.0, 1.3)
+    images[0][60:160, 240:] = 250
+    factors = GainCompensation(LAYOUT, VIEWS, images).factors
+    assert factors[0] / factors[1] == pytest.approx(np.full(3, 1.3), rel=RIGHT)
+
+
+def test_equal_cameras_are_left_alone():
+    gain = GainCompensation(LAYOUT, VIEWS, pictures())
+    drawn = np.arange(60, dtype=np.uint8).reshape(4, 5, 3)
+    gain.apply(0, drawn)
+    assert (drawn.ravel() == np.arange(60)).all()
+
+
+def test_it_follows_a_change_of_exposure_without_a_jump():
+    gain = GainCompensation(LAYOUT, VIEWS, pictures())
+    images = pictures(1.0, 1.3)
+    relations = []
+    for _ in range(240):
+        gain.update(images)
+        relations.append(np.log(gain.factors[0, 0] / gain.factors[1, 0]))
+    steps = np.diff(relations)
+    assert relations[-1] == pytest.approx(np.log(1.3), abs=RIGHT)
+    assert (steps >= 0).all()
+    assert steps.max() < np.log(1.3) / 3
+
+
+def test_noise_and_a_passer_by_do_not_flicker():
+    noise = np.random.default_rng(3)
+    clean = pictures(1.0, 1.3)
+    gain = GainCompensation(LAYOUT, VIEWS, clean)
+    compositor = Compositor(LAYOUT, VIEWS, gain=gain)
+    out = np.empty((LAYOUT.surface.height, LAYOUT.surface.width, 3), np.uint8)
+    seam, brightness = slice(*LAYOUT.seams[0]), []
+    for i in range(64):
+        noisy = [c + noise.normal(0, 4, c.shape) for c in clean]
+        noisy[1][:, 3 * i - 30 : 3 * i] = 20
+        gain.update([image.clip(0, 255).astype(np.uint8) for image in noisy])
+        compositor.compose(clean, out)
+        brightness.append(out[:, seam].mean())
+    assert np.ptp(brightness) < UNSEEN_LEVELS
+
+
+def test_grey_pictures():
+    images = [image[..., 1] for image in pictures(1.0, 1.3)]
+    gain = GainCompensation(LAYOUT, VIEWS, images)
+    assert gain.factors == pytest.approx(np.array([[1.0], [1 / 1.3]]), rel=RIGHT)
+    drawn = np.full((10, 20), 130, np.uint8)
+    gain.apply(1, drawn)
+    assert (drawn == 100).all()
+
+
+def test_a_chain_of_cameras_is_evened_out_to_one():
+    offsets = [(np.radians(120) * SURFACE.focal_px, 0.0)] * 2
+    views = [View(LENS, SURFACE)] * 3
+    layout = lay_out(views, offsets, fade_px=8.0, crop='valid')
+    images = [
+        (Scene().view(LENS, Turn(yaw_rad=np.radians(yaw))).frame(0) * exposure).astype(np.uint8)
+        for yaw, exposure in ((-120, 1.1), (0, 0.9), (120, 1.2))
+    ]
+    factors = GainCompensation(layout, views, images).factors[:, 0]
+    assert factors == pytest.approx([0.9 / 1.1, 1.0, 0.9 / 1.2], rel=RIGHT)
+
+
+def test_without_a_common_scene_nothing_is_changed():
+    layout = lay_out(VIEWS, [(float(SURFACE.width), 0.0)], fade_px=8.0, crop='none')
+    assert (GainCompensation(layout, VIEWS, pictures(1.0, 1.3)).factors == 1.0).all()
