@@ -31,6 +31,9 @@ bench: build ## measure rates and delays (also bench-overlap, bench-calibration,
 bench-%: build
 	@$(run) python benchmarks/$*.py $(ARGS)
 
+docs: build ## write the parameter tables of docs/ anew
+	@$(run) python tools/parameter_tables.py
+
 lint: .venv/.done ## check style and format
 	@source .venv/local_setup.bash && ruff check . && ruff format --check .
 
@@ -52,4 +55,4 @@ install/.built: .venv/.done $(sources)
 	@touch $@
 
 force:
-.PHONY: help build demo view test test-faults bench lint clean force
+.PHONY: help build demo view test test-faults bench docs lint clean force

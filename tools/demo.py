@@ -10,7 +10,8 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from rig import Rig, camera_parameters, unused_domain, wait_for
+from contact_sheet import contact_sheet, with_particles
+from rig import SIDES, Rig, camera_parameters, unused_domain, wait_for
 from watcher import Watcher
 
 from fisheye_geometry.errors import FisheyeError
@@ -68,7 +69,24 @@ def demonstrate(rig: Rig, watcher: Watcher, begin: float, arguments: argparse.Na
     watch(watcher, rig, arguments.seconds)
     report(watcher, answer, arguments)
     cv2.imwrite(str(arguments.out / 'panorama.png'), watcher.picture())
-    print(f'Saved {arguments.out / "panorama.png"}')
+    cv2.imwrite(str(arguments.out / 'contact_sheet.png'), sheet(watcher, answer.overlaps[0]))
+    print(f'Saved panorama.png and contact_sheet.png in {arguments.out}')
+
+
+def sheet(watcher: Watcher, overlap) -> np.ndarray:
+    """Draw how the panorama came about: raw, corrected with the overlap's particles, stitched."""
+    rows = [[(f'{side}/image_raw', watcher.picture_on(f'{side}/image_raw')) for side in SIDES]]
+    if watcher.node.count_publishers('left/image_rect'):
+        left, right = (watcher.picture_on(f'{side}/image_rect') for side in SIDES)
+        half = left.shape[1] - left.shape[1] // 2
+        particles = overlap.left_particles, overlap.right_particles
+        rows.append(
+            [
+                ('left/image_rect', with_particles(left, particles[0], overlap.left_match, half)),
+                ('right/image_rect', with_particles(right, particles[1], overlap.right_match, 0)),
+            ]
+        )
+    return contact_sheet([*rows, [('panorama/image', watcher.picture())]])
 
 
 def parse() -> argparse.Namespace:

@@ -66,6 +66,20 @@ class Watcher:
         """Give a copy of the newest panorama."""
         return to_array(self.newest)[0].copy()
 
+    def picture_on(self, topic: str, timeout_s: float = 10.0) -> np.ndarray:
+        """Give the next picture of an image topic."""
+        taken, came = [], threading.Event()
+
+        def take(message):
+            taken.append(message)
+            came.set()
+
+        subscription = self.node.create_subscription(Image, topic, take, IMAGE_INPUT)
+        if not came.wait(timeout_s):
+            raise TimeoutError(f'no picture came on {topic} within {timeout_s:g} s')
+        self.node.destroy_subscription(subscription)
+        return to_array(taken[0])[0]
+
     def calibrate(self, timeout_s: float = 20.0, **request) -> CalibrateOverlap.Response:
         """Call the rig's calibrate_overlap service."""
         if not self._client.wait_for_service(timeout_s):
