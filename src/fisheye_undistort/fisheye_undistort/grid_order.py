@@ -1,8 +1,10 @@
 """Put circles into the order of a printed grid, however strongly the lens bends it."""
 
 from heapq import heappop, heappush
+from itertools import count
 
 import numpy as np
+from scipy.signal import correlate2d
 
 from fisheye_geometry.errors import CalibrationError
 from fisheye_undistort.circle_grid import Circles
@@ -65,9 +67,9 @@ class _Neighbourhood:
         self._stretch = (vectors * scale[:, None, :]) @ vectors.transpose(0, 2, 1)
         self._shrink = np.linalg.inv(self._stretch)
         spacing = np.array([target.dx_mm, target.dy_mm])
-        steps = np.array(target.steps)
-        self._steps = [(tuple(step), step * spacing) for step in np.concatenate([steps, -steps])]
-        lengths = np.linalg.norm(steps * spacing, axis=1)
+        self._steps = np.concatenate([target.steps, np.negative(target.steps)]).tolist()
+        self._steps_mm = self._steps * spacing
+        lengths = np.linalg.norm(self._steps_mm, axis=1)
         self._limit_mm = _TOLERANCE * lengths.min()
         self._reach_mm = lengths.max() + self._limit_mm
 
@@ -78,7 +80,7 @@ class _Neighbourhood:
             return
         offsets = self._offsets_mm(seed, near, self._stretch[seed], self._stretch[near])
         offset = offsets[np.argmin(np.hypot(*offsets.T))]
-        for _, step_mm in self._steps:
+        for step_mm in self._steps_mm:
             if abs(np.hypot(*offset) - np.hypot(*step_mm)) < self._limit_mm:
                 yield self._stretch[seed] @ _rotations(_angle(offset) - _angle(step_mm))
 
@@ -92,30 +94,31 @@ class _Neighbourhood:
         mismatch_mm : float
             Mean distance of the circles from where the steps led.
         """
-        cells, misses, steps = {}, [], []
+        cells, misses, steps, order = {}, [], [], count()
         circle, cell, miss = seed, (0, 0), 0.0
         while True:
             if circle not in cells and cell not in cells.values():
                 cells[circle] = cell
                 misses.append(miss)
-                for step in self._steps_from(circle, cell, jacobian):
-                    heappush(steps, step)
+                for miss, *step in self._steps_from(circle, cell, jacobian):
+                    heappush(steps, (miss, next(order), step))
             if not steps:
                 return cells, float(np.mean(misses))
-            miss, circle, cell, jacobian = heappop(steps)
+            miss, _, (circle, cell, jacobian) = heappop(steps)
 
     def _steps_from(self, at: int, cell: tuple, jacobian: np.ndarray):
         """Steps to the neighbours of a circle: mismatch, circle, cell, and the Jacobian there."""
         near = self._near(at)
         there = self._carry(jacobian, near)
         offsets = self._offsets_mm(at, near, jacobian, there)
-        for step, step_mm in self._steps:
-            misses = np.hypot(*(offsets - step_mm).T)
-            following = (cell[0] + step[0], cell[1] + step[1])
-            for i in np.flatnonzero(misses < self._limit_mm):
-                # Where the step really led tells how far the turn has drifted on the way here.
-                corrected = there[i] @ _rotations(_angle(offsets[i]) - _angle(step_mm))
-                yield float(misses[i]), int(near[i]), following, corrected
+        misses = np.linalg.norm(offsets - self._steps_mm[:, None], axis=-1)
+        which, where = np.nonzero(misses < self._limit_mm)
+        # Where the step really led tells how far the turn has drifted on the way here.
+        drift = _angle(offsets[where]) - _angle(self._steps_mm[which])
+        corrected = there[where] @ _rotations(drift)
+        for step, other, turned in zip(which, where, corrected, strict=True):
+            following = (cell[0] + self._steps[step][0], cell[1] + self._steps[step][1])
+            yield float(misses[step, other]), int(near[other]), following, turned
 
     def _near(self, at: int) -> np.ndarray:
         """Circles within reach of one step."""
@@ -136,8 +139,8 @@ class _Neighbourhood:
         return np.linalg.solve((jacobian + there) / 2, offsets_px)[..., 0]
 
 
-def _angle(vector: np.ndarray) -> float:
-    return np.arctan2(vector[1], vector[0])
+def _angle(vectors: np.ndarray) -> np.ndarray:
+    return np.arctan2(vectors[..., 1], vectors[..., 0])
 
 
 def _rotations(angle) -> np.ndarray:
@@ -148,19 +151,28 @@ def _rotations(angle) -> np.ndarray:
 
 def _match(cells: dict[int, tuple], target: Target) -> dict[int, int] | None:
     """Shift cells onto the target; its ids to circles, or None if it is another grid."""
-    ids = {tuple(cell): i for i, cell in enumerate(target.cells.tolist())}
-    fits = []
-    origin = next(iter(cells.values()))
-    for cell in ids:
-        shift = (cell[0] - origin[0], cell[1] - origin[1])
-        moved = {(x + shift[0], y + shift[1]): circle for circle, (x, y) in cells.items()}
-        fits.append({ids[c]: circle for c, circle in moved.items() if c in ids})
-    most = max(map(len, fits))
+    found = np.array(list(cells.values()))
+    found -= found.min(axis=0)
+    shifts = correlate2d(_occupied(found), _occupied(target.cells))
+    most = shifts.max()
     # A dark thing beside the sheet may pass for a neighbour; where circles are missing too, the
     # whole order is in doubt.
-    sure = most == len(ids) or 2 * most - len(cells) >= _MIN_SHARE * len(ids)
-    ambiguous = sum(len(fit) == most for fit in fits) > 1
-    return max(fits, key=len) if sure and not ambiguous else None
+    wanted = len(target.cells)
+    sure = most == wanted or 2 * most - len(cells) >= _MIN_SHARE * wanted
+    if not sure or np.count_nonzero(shifts == most) > 1:
+        return None
+    shift = np.array(np.unravel_index(shifts.argmax(), shifts.shape))[::-1]
+    moved = found - shift + target.cells.max(axis=0)
+    ids = {tuple(cell): i for i, cell in enumerate(target.cells.tolist())}
+    at = zip(map(tuple, moved.tolist()), cells, strict=True)
+    return {ids[cell]: circle for cell, circle in at if cell in ids}
+
+
+def _occupied(cells: np.ndarray) -> np.ndarray:
+    """Mark cells (N, 2), column and row, in an array of rows and columns."""
+    grid = np.zeros(cells.max(axis=0)[::-1] + 1, int)
+    grid[cells[:, 1], cells[:, 0]] = 1
+    return grid
 
 
 def _what_is_there(circles: Circles, cells: dict[int, tuple], target: Target) -> str:

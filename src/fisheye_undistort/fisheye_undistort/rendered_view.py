@@ -6,6 +6,7 @@ from functools import lru_cache
 import cv2
 import numpy as np
 
+from fisheye_geometry.errors import GeometryError
 from fisheye_geometry.lens import Lens
 from fisheye_undistort.target import Target
 from fisheye_undistort.target_sheet import sheet_picture
@@ -13,6 +14,10 @@ from fisheye_undistort.target_sheet import sheet_picture
 _SHEET_PX_PER_MM = 4.0
 _SUBPIXELS = 3
 """Rays per pixel in each direction: edges of the print become grey as on a sensor."""
+
+
+_NO_SHEET = -10.0
+_TRIES = 200
 
 
 @dataclass(frozen=True)
@@ -58,6 +63,30 @@ def facing_pose(
     return Pose(rotation, facing @ (0.0, 0.0, distance_mm))
 
 
+def scattered_poses(
+    lens: Lens, target: Target, count: int, distance_mm: tuple[float, float], seed: int = 0
+) -> list[Pose]:
+    """Poses all over the picture in which a lens sees the whole pattern, tilted at random."""
+    random = np.random.default_rng(seed)
+    reach = np.abs(target.points_mm).max(axis=0) + target.radius_mm
+    outline = np.linspace(-1, 1, 9)
+    outline = np.stack(np.meshgrid(outline, outline, 0.0), axis=-1).reshape(-1, 3) * reach
+    last = np.array([lens.width - 1, lens.height - 1])
+    poses = []
+    for _ in range(_TRIES * count):
+        tilt = random.uniform((-0.6, -0.6, -3), (0.6, 0.6, 3))
+        pose = facing_pose(
+            random.uniform(0, 2 * np.pi), random.uniform(0, 1.4), random.uniform(*distance_mm),
+            tilt,
+        )
+        pixels, seen = lens.project(outline @ pose.rotation.T + pose.translation_mm)
+        if seen.all() and np.all((pixels > 1) & (pixels < last - 1)):
+            poses.append(pose)
+        if len(poses) == count:
+            return poses
+    raise GeometryError(f'the lens sees the whole {target} too seldom from {distance_mm} mm')
+
+
 def render_view(lens: Lens, target: Target, pose: Pose, look: Look = Look(), seed=0) -> np.ndarray:
     """Photograph the printed sheet in front of a mottled backdrop.
 
@@ -67,48 +96,80 @@ def render_view(lens: Lens, target: Target, pose: Pose, look: Look = Look(), see
         (lens.height, lens.width) uint8.
     """
     random = np.random.default_rng(seed)
-    rays, seen = _rays(lens)
-    sheet, origin = _sheet(target)
-    x, y, depth = np.moveaxis(rays @ pose.rotation, -1, 0)
-    place = pose.rotation.T @ pose.translation_mm.astype(np.float32)
-    with np.errstate(divide='ignore', invalid='ignore'):
-        scale = np.where(depth * place[2] > 0, place[2] / depth, np.nan)
-        where = [(c * scale - p) * _SHEET_PX_PER_MM + o for c, p, o in
-                 zip((x, y), place, origin, strict=False)]
-    where = [np.nan_to_num(c, nan=-1e4).clip(-1e4, 1e4).astype(np.float32) for c in where]
-    print_ = cv2.remap(sheet, *where, cv2.INTER_LINEAR, borderValue=-1)
-    fine = np.where(print_ >= 0, look.ink + (look.paper - look.ink) * print_, look.backdrop)
-    fine = np.where(seen, fine, 0.0).astype(np.float32)
-    picture = cv2.resize(fine, (lens.width, lens.height), interpolation=cv2.INTER_AREA)
-    picture = _light(picture, look, random)
+    rays, lit = _rays(lens)
+    picture = lit * look.backdrop * _mottle(lit.shape, random)
+    top, bottom, left, right = _window(lens, target, pose)
+    if top < bottom and left < right:
+        fine = (slice(edge[0] * _SUBPIXELS, edge[1] * _SUBPIXELS) for edge in
+                ((top, bottom), (left, right)))
+        ink, covered = _sheet_seen(rays[tuple(fine)], target, pose)
+        sheet = look.ink * ink + look.paper * (covered - ink)
+        window = picture[top:bottom, left:right]
+        window[:] = window * (1 - covered) + sheet
+    picture *= np.linspace(1.0, 1.0 - look.light_falloff, lens.width)
     picture = cv2.GaussianBlur(picture, (0, 0), look.blur_px) if look.blur_px else picture
     picture += random.normal(0.0, look.noise, picture.shape)
     return picture.round().clip(0, 255).astype(np.uint8)
 
 
-def _light(picture, look, random):
-    """Light that falls off across the picture, and a backdrop that is not plain."""
-    height, width = picture.shape
-    mottle = cv2.resize(random.normal(1.0, 0.3, (12, 16)), (width, height),
-                        interpolation=cv2.INTER_CUBIC)
-    picture = np.where(picture == look.backdrop, picture * mottle, picture)
-    slope = np.linspace(1.0, 1.0 - look.light_falloff, width)
-    return (picture * slope).astype(np.float32)
+def _mottle(shape: tuple[int, int], random) -> np.ndarray:
+    """Give a backdrop that is not plain, around 1."""
+    return cv2.resize(random.normal(1.0, 0.3, (12, 16)), shape[::-1],
+                      interpolation=cv2.INTER_CUBIC)
+
+
+def _window(lens: Lens, target: Target, pose: Pose) -> tuple[int, int, int, int]:
+    """Rows and columns of the picture that hold the sheet: top, bottom, left, right."""
+    sheet, origin = _sheet(target)
+    height, width = sheet.shape
+    along, zero = np.linspace(0, 1, 50), np.zeros(50)
+    x = np.concatenate([along, along, zero, zero + 1]) * width
+    y = np.concatenate([zero, zero + 1, along, along]) * height
+    edge = (np.stack([x, y], axis=-1) - origin) / _SHEET_PX_PER_MM
+    edge = np.concatenate([edge, np.zeros((len(edge), 1))], axis=-1)
+    pixels, seen = lens.project(edge @ pose.rotation.T + pose.translation_mm)
+    if not seen.all():
+        return 0, lens.height, 0, lens.width
+    limits = np.array([lens.width, lens.height])
+    first = (np.floor(pixels.min(axis=0)).astype(int) - 1).clip(0, limits)
+    last = (np.ceil(pixels.max(axis=0)).astype(int) + 2).clip(0, limits)
+    return first[1], last[1], first[0], last[0]
+
+
+def _sheet_seen(rays: np.ndarray, target: Target, pose: Pose) -> tuple[np.ndarray, np.ndarray]:
+    """Shares of ink and of sheet in each pixel, from rays (rows * n, columns * n, 3)."""
+    sheet, origin = _sheet(target)
+    x, y, depth = np.moveaxis(rays @ pose.rotation.astype(np.float32), -1, 0)
+    place = (pose.rotation.T @ pose.translation_mm).astype(np.float32)
+    scale = np.divide(place[2], depth, out=np.full_like(depth, -1), where=depth * place[2] > 0)
+    where = [
+        ((axis * scale - start) * _SHEET_PX_PER_MM + middle).clip(-9, 32000).astype(np.float32)
+        for axis, start, middle in zip((x, y), place, origin, strict=False)
+    ]
+    print_ = cv2.remap(sheet, *where, cv2.INTER_LINEAR, borderValue=_NO_SHEET)
+    covered = (print_ > _NO_SHEET / 2) & (scale > 0)
+    size = (x.shape[1] // _SUBPIXELS, x.shape[0] // _SUBPIXELS)
+    return tuple(
+        cv2.resize(share.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+        for share in (np.where(covered, 1 - print_.clip(0), 0), covered)
+    )
 
 
 @lru_cache(maxsize=2)
-def _rays(lens: Lens):
-    """Rays (height * n, width * n, 3) float32 of every subpixel, and which are seen."""
+def _rays(lens: Lens) -> tuple[np.ndarray, np.ndarray]:
+    """Rays (height * n, width * n, 3) float32 of every subpixel, and the lit share of pixels."""
     y, x = (
         (np.arange(size * _SUBPIXELS) + 0.5) / _SUBPIXELS - 0.5
         for size in (lens.height, lens.width)
     )
     rays, seen = lens.unproject(np.stack(np.meshgrid(x, y), axis=-1))
-    return rays.astype(np.float32), seen
+    lit = cv2.resize(seen.astype(np.float32), (lens.width, lens.height),
+                     interpolation=cv2.INTER_AREA)
+    return rays.astype(np.float32), lit
 
 
 @lru_cache(maxsize=4)
-def _sheet(target: Target):
+def _sheet(target: Target) -> tuple[np.ndarray, np.ndarray]:
     """The print, 0 for ink to 1 for paper, and the pixel of the target's origin."""
     picture, origin = sheet_picture(target, _SHEET_PX_PER_MM)
     return picture.astype(np.float32) / 255, origin

@@ -58,7 +58,8 @@ def sheet_picture(target: Target, px_per_mm: float) -> tuple[np.ndarray, np.ndar
     """
     paper, (width, height) = paper_for(target)
     figure = _draw(target, paper, (width, height))
-    figure.set_dpi(px_per_mm * _MM_PER_INCH)
+    # A hair more, or rounding down costs a row of pixels.
+    figure.set_dpi(px_per_mm * _MM_PER_INCH * (1 + 1e-9))
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     picture = cv2.cvtColor(np.asarray(canvas.buffer_rgba()), cv2.COLOR_RGBA2GRAY)
@@ -107,7 +108,8 @@ def _draw(target: Target, paper: str, size_mm: tuple[float, float]) -> Figure:
 
 
 def _circles(target: Target):
-    return [Circle(point, target.radius_mm, color='black', lw=0) for point in target.points_mm[:, :2]]
+    centers = target.points_mm[:, :2]
+    return [Circle(center, target.radius_mm, color='black', lw=0) for center in centers]
 
 
 def _squares(target: Target):

@@ -1,0 +1,96 @@
+import numpy as np
+import pytest
+from conftest import seen_exactly
+
+from fisheye_undistort.first_guess import first_guess
+from fisheye_undistort.lens_fit import GROUPS, Estimate, View, _damp, _Problem, fit
+from fisheye_undistort.rendered_view import scattered_poses
+from fisheye_undistort.sheet_model import UNKNOWNS, bend, lens_of, project
+from fisheye_undistort.target import Target
+
+TARGET = Target('circles', 4, 5, 40, 40, radius_mm=15)
+UNKNOWN_TRUTH = np.array([215, 216, 322, 238, 0.02, -0.01, 0.003, -0.0008, 1.5, -0.5, 0.8])
+SLOPE = 1e-5
+"""Central differences of float64 are good to this share."""
+
+
+@pytest.fixture(scope='module')
+def views(paper_lens):
+    return [
+        seen_exactly(paper_lens, TARGET, pose, str(i))
+        for i, pose in enumerate(scattered_poses(paper_lens, TARGET, 6, (120, 200)))
+    ]
+
+
+def numeric(function, at, step=1e-6):
+    """Central differences along each coordinate, in the last axis."""
+    return np.stack(
+        [(function(at + d) - function(at - d)) / (2 * step) for d in step * np.eye(len(at))],
+        axis=-1,
+    )
+
+
+def test_the_projection_is_the_lenss_own():
+    rays = np.random.default_rng(0).normal(size=(100, 3))
+    lens = lens_of(UNKNOWN_TRUTH, (640, 480))
+    pixels, seen = lens.project(rays)
+    assert seen.sum() > 50
+    assert np.allclose(project(UNKNOWN_TRUTH, rays)[0][seen], pixels[seen], atol=1e-9)
+
+
+@pytest.mark.parametrize('ray', [(0.3, -0.2, 1.0), (0.9, 0.5, -0.1), (1e-4, 0, 1), (0, 2, 0.3)])
+def test_derivatives_of_the_projection(ray):
+    ray = np.array(ray, float)
+    _, by_intrinsics, by_point = project(UNKNOWN_TRUTH, ray[None])
+    expected = numeric(lambda p: project(UNKNOWN_TRUTH, p[None])[0][0], ray)
+    assert np.allclose(by_point[0], expected, rtol=SLOPE, atol=1e-3)
+    expected = numeric(lambda u: project(u, ray[None])[0][0], UNKNOWN_TRUTH)
+    assert np.allclose(by_intrinsics[0], expected[:, :8], rtol=SLOPE, atol=1e-3)
+
+
+def test_derivatives_of_the_whole_problem(views):
+    nominal = np.concatenate([UNKNOWN_TRUTH[:4] + 5, np.zeros(7)])
+    problem = _Problem(views, TARGET.points_mm, nominal, tuple(GROUPS), None)
+    poses = np.tile([0.2, -0.1, 0.3, 10.0, 5.0, 180.0], (len(views), 1))
+    vector = problem.pack(Estimate(UNKNOWN_TRUTH, poses))
+    jacobian = problem.jacobian(vector)
+    expected = numeric(problem.residuals, vector)
+    assert np.allclose(jacobian, expected, rtol=1e-4, atol=1e-4 * np.abs(expected).max())
+
+
+def test_far_points_count_linearly():
+    misses = np.array([-100.0, -0.01, 0.0, 0.01, 100.0])
+    damped, _ = _damp(misses)
+    assert np.allclose(damped[1:4], misses[1:4], rtol=1e-4)
+    assert np.allclose(damped[[0, 4]] ** 2, 2 * 100, rtol=0.02)
+    assert np.all(np.sign(damped) == np.sign(misses))
+
+
+def test_a_bulge_is_zero_in_the_middle_and_full_at_the_edge():
+    bent = bend(TARGET.points_mm, np.array([2.0, 0.0, 0.0]))
+    assert np.allclose(bent[:, :2], TARGET.points_mm[:, :2])
+    assert np.allclose(bent[::5, 2], 2.0)
+    assert np.allclose(bent[2::5, 2], 0.0)
+
+
+def test_deviations_are_those_of_repeated_fits(views):
+    noise_px = 0.2
+    nominal = np.zeros(len(UNKNOWNS))
+    nominal[:4] = 210, 210, 319.5, 239.5
+    free = ('focal length', 'k1', 'principal point', 'k2')
+    random = np.random.default_rng(4)
+    results, claimed = [], []
+    poses = first_guess(views, TARGET.points_mm, (640, 480)).poses
+    for _ in range(30):
+        noisy = [
+            View(v.name, v.points_px + random.normal(0, noise_px, v.points_px.shape), v.ids)
+            for v in views
+        ]
+        estimate = fit(noisy, TARGET.points_mm, Estimate(nominal, poses), nominal, free)
+        results.append(estimate.unknowns)
+        claimed.append(np.sqrt(np.diag(estimate.covariance)))
+    scatter, claimed = np.std(results, axis=0), np.mean(claimed, axis=0)
+    fitted = claimed > 0
+    assert fitted.sum() == 6
+    # Thirty repetitions know a deviation to 13 %; four times that is no chance.
+    assert np.allclose(scatter[fitted], claimed[fitted], rtol=0.5)

@@ -1,0 +1,52 @@
+import numpy as np
+import pytest
+
+from fisheye_geometry.errors import SettingError
+from fisheye_undistort.target import KINDS, STANDARD, Target
+
+
+def test_every_kind_has_a_standard_sheet():
+    assert tuple(STANDARD) == KINDS
+    assert all(STANDARD[kind].kind == kind for kind in KINDS)
+
+
+def test_the_papers_sheet():
+    points = STANDARD['circles'].points_mm
+    assert points.tolist() == [[x, y, 0] for y in (-70, 0, 70) for x in (-100, 0, 100)]
+
+
+def test_every_other_row_of_acircles_is_moved():
+    target = Target('acircles', 3, 2, 20, 20, radius_mm=8)
+    x, y, _ = (target.points_mm - target.points_mm[0]).T
+    assert x.tolist() == [0, 40, 20, 60, 0, 40]
+    assert y.tolist() == [0, 0, 20, 20, 40, 40]
+
+
+def test_a_charuco_board_has_inner_corners_only():
+    assert len(STANDARD['charuco'].points_mm) == 4 * 6
+
+
+def test_points_are_centred():
+    for target in STANDARD.values():
+        extremes = np.array([target.points_mm.min(axis=0), target.points_mm.max(axis=0)])
+        assert np.allclose(extremes.sum(axis=0), 0)
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'told'),
+    [
+        (('stars', 3, 3, 10, 10, 3), "target 'stars'"),
+        (('circles', 1, 3, 10, 10, 3), 'rows of the circles target is 1'),
+        (('circles', 3, 101, 10, 10, 3), 'columns of the circles target is 101'),
+        (('circles', 3, 3, 0, 10, 3), 'dx_mm is 0'),
+        (('circles', 3, 3, float('nan'), 10, 3), 'dx_mm is nan'),
+        (('circles', 3, 3, 10, 10, 5), 'radius_mm is 5; on this sheet expected more than 0 and 4'),
+        (('chessboard', 6, 9, 25, 20), '25 x 20 mm'),
+        (('charuco', 5, 7, 35, 35, 0, 35), 'marker_mm is 35'),
+        (('charuco', 30, 30, 35, 35, 0, 20), 'more than the 250 markers'),
+    ],
+)
+def test_impossible_targets_are_refused_by_name(arguments, told):
+    with pytest.raises(SettingError) as error:
+        Target(*arguments)
+    assert told in str(error.value)
