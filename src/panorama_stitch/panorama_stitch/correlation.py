@@ -34,14 +34,18 @@ class Landscape:
     score: np.ndarray
 
     def peaks(self, count: int, apart_px: int) -> list[tuple[int, int]]:
-        """Give up to `count` offsets (x, y) with the highest scores above 0, highest first."""
+        """Give up to `count` offsets (x, y) with the highest scores above 0, highest first.
+
+        At the first and last `y` there is none: the score may go on rising beyond.
+        """
         score = self.score.copy()
         found = []
         while len(found) < count:
             row, column = np.unravel_index(np.argmax(score), score.shape)
             if score[row, column] <= 0:
                 break
-            found.append((int(self.x[column]), int(self.y[row])))
+            if 0 < row < len(self.y) - 1:
+                found.append((int(self.x[column]), int(self.y[row])))
             score[:, np.abs(self.x - self.x[column]) <= apart_px] = -1
         return found
 
@@ -90,13 +94,16 @@ def correlate(
         )
     )
     spot = np.ix_(rows % shape[0], columns % shape[1])
-    (l, l2, l1), (r, r2, r1) = (
+    (left, left_square, left_seen), (right, right_square, right_seen) = (
         [_spectrum(image, shape) for image in (one.image, one.image * one.image, one.valid)]
         for one in (facing.left, facing.right)
     )
     both, left_energy, right_energy, pixels = (
         cv2.dft(cv2.mulSpectrums(a, b, 0, conjB=True), flags=cv2.DFT_INVERSE | cv2.DFT_SCALE)[spot]
-        for a, b in ((l, r), (l2, r1), (l1, r2), (l1, r1))
+        for a, b in (
+            (left, right), (left_square, right_seen), (left_seen, right_square),
+            (left_seen, right_seen),
+        )
     )
     energy = np.sqrt(np.maximum(left_energy, 0) * np.maximum(right_energy, 0))
     score = less_chance(both / np.maximum(energy, 1.0), energy, pixels)

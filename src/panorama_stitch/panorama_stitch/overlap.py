@@ -36,7 +36,7 @@ class OverlapSettings:
         choices=METHODS, live=True,
     )
     min_confidence: float = setting(
-        0.38, 'confidence below which two views count as having no common scene',
+        0.3, 'confidence below which two views count as having no common scene',
         minimum=0.0, maximum=1.0, live=True,
     )
     expected_yaw_deg: float = setting(

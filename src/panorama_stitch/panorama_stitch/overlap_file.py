@@ -8,6 +8,7 @@ from fisheye_geometry.errors import CameraFileError
 from fisheye_geometry.remap import Turn
 from fisheye_geometry.surface import Surface
 from fisheye_geometry.yaml_file import read_mapping, write_mapping
+
 from panorama_stitch.overlap import METHODS, Overlap
 
 VERSION = 1
@@ -136,7 +137,8 @@ def _check_cameras(entries, cameras, surfaces) -> None:
 def _overlap(left: str, right: str, entry: dict) -> Overlap:
     pair = f"the overlap of '{left}' and '{right}'"
     if (entry.get('left'), entry.get('right')) != (left, right):
-        raise CameraFileError(f'{pair} is missing; found {entry.get("left")}, {entry.get("right")}')
+        neighbours = f'{entry.get("left")}, {entry.get("right")}'
+        raise CameraFileError(f'{pair} is missing; found {neighbours}')
     for key in _NUMBERS:
         value = entry.get(key)
         if type(value) not in (int, float) or not isfinite(value):

@@ -86,7 +86,7 @@ def propose(facing: Facing, max_rise_px: float) -> Proposals:
             indices, alike = _pair_up(*found, level_y_px, max_rise_px * facing.step)
             pairs.append(indices + first)
             likeness.append(alike)
-            for side, particles in zip(sides, found):
+            for side, particles in zip(sides, found, strict=True):
                 side.extend(particles)
             first = tuple(map(len, sides))
     left, right = map(tuple, sides)

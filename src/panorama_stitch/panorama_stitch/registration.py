@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import inf
+from math import inf, radians
+from operator import itemgetter
 
 import numpy as np
 from fisheye_geometry.surface import Surface
@@ -20,7 +21,7 @@ _APART_DEG = 3.0
 _CANDIDATES = 8
 _CLOSE = 0.15
 """An offset whose score is this much below the best one may still be the right one."""
-_DISTINCT = 1.3
+_DISTINCT = 1.4
 """Any other offset leaves at least this much more unexplained where the scene is distinct."""
 
 
@@ -46,7 +47,7 @@ class Search:
     max_rise_deg: float = 4.0
     min_overlap_deg: float = 5.0
     tilt: bool = True
-    min_confidence: float = 0.38
+    min_confidence: float = 0.3
 
 
 @dataclass(frozen=True)
@@ -98,32 +99,30 @@ def register(
     """
     pair = left, right, surface_left, surface_right
     facing = face(*pair, _SEARCH_PX_PER_DEG, structure)
-    landscape = _explore(facing, search)
-    result = _NOTHING
+    px_per_deg = facing.surface.focal_px * radians(1)
+    landscape = _explore(facing, search, px_per_deg)
+    offsets = landscape.peaks(_CANDIDATES, round(_APART_DEG * px_per_deg))
+    proposals, proposed = None, []
     if by_particles:
-        proposals = propose(facing, search.max_rise_deg * _px_per_deg(facing))
-        result = _verify(facing, landscape, proposals.offsets(landscape, _CANDIDATES), search.tilt)
-        result = replace(result, proposals=proposals)
-    if result.confidence < search.min_confidence:
-        peaks = landscape.peaks(_CANDIDATES, round(_APART_DEG * _px_per_deg(facing)))
-        result = _verify(facing, landscape, peaks, search.tilt)
+        proposals = propose(facing, search.max_rise_deg * px_per_deg)
+        proposed = proposals.offsets(landscape, _CANDIDATES)
+    result = _verify(facing, landscape, [*proposed, *offsets], search.tilt, px_per_deg)
     pose = result.pose.scaled(facing.step)
+    if not any(abs(x - result.pose.x_px) <= _APART_DEG * px_per_deg for x, _ in proposed):
+        proposals = None
     if result.confidence >= search.min_confidence:
         fine = face(*pair, _FINE_PX_PER_DEG, plain)
         pose = align(fine, pose.scaled(1 / fine.step), _FINE_SEARCH_DEG, search.tilt)
         pose = pose.scaled(fine.step)
-    rival = result.rival_x_px
-    return replace(result, pose=pose, rival_x_px=None if rival is None else rival * facing.step)
+    rival = None if result.rival_x_px is None else result.rival_x_px * facing.step
+    return replace(result, pose=pose, rival_x_px=rival, proposals=proposals)
 
 
-def _px_per_deg(facing: Facing) -> float:
-    return facing.surface.focal_px * np.pi / 180
-
-
-def _explore(facing: Facing, search: Search) -> Landscape:
+def _explore(facing: Facing, search: Search, px_per_deg: float) -> Landscape:
     """Score all offsets that may be."""
-    narrowest = round(search.min_overlap_deg * _px_per_deg(facing))
-    rise = round(search.max_rise_deg * _px_per_deg(facing))
+    narrowest = round(search.min_overlap_deg * px_per_deg)
+    # One row more on either side tells a peak from a slope that goes on.
+    rise = round(search.max_rise_deg * px_per_deg) + 1
     level = round(facing.level_y_px)
     (height, width), right_width = facing.left.image.shape, facing.right.image.shape[1]
     low, high = (int(np.clip(x / facing.step, -1e6, 1e6)) for x in search.x_px)
@@ -134,21 +133,26 @@ def _explore(facing: Facing, search: Search) -> Landscape:
 
 
 def _verify(
-    facing: Facing, landscape: Landscape, offsets: Sequence[tuple[int, int]], tilt: bool
+    facing: Facing,
+    landscape: Landscape,
+    offsets: Sequence[tuple[int, int]],
+    tilt: bool,
+    px_per_deg: float,
 ) -> Registration:
     """Align the promising offsets, and tell the best of them from any other."""
     promising = landscape.score.max() - _CLOSE
     verified = []
-    for x, y in offsets:
-        if landscape.score_at(x, y) >= promising:
+    for x, y in dict.fromkeys(offsets):
+        if landscape.score_at(x, y) >= promising and landscape.y[0] < y < landscape.y[-1]:
             level = Pose(float(x), float(y))
             poses = level, align(facing, level, _TILE_SEARCH_DEG, tilt)
-            verified.append(max((certainty(facing, pose), pose.x_px, pose) for pose in poses))
+            tried = ((certainty(facing, pose), pose.x_px, pose) for pose in poses)
+            verified.append(max(tried, key=itemgetter(0)))
     if not verified:
         return _NOTHING
-    best, best_x, pose = max(verified)
-    apart = _APART_DEG * _px_per_deg(facing)
-    rivals = [(landscape.best_away_from(best_x, apart))]
+    best, best_x, pose = max(verified, key=itemgetter(0))
+    apart = _APART_DEG * px_per_deg
+    rivals = [landscape.best_away_from(best_x, apart)]
     rivals += [(sure, x) for sure, x, _ in verified if abs(x - best_x) > apart]
     rival, rival_x = max(rivals)
     distinct = (1 - rival) / max(1 - best, 1e-6)

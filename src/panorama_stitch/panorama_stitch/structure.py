@@ -1,8 +1,8 @@
 """What a picture has to hold on to: edges and texture, with exposure and smooth areas removed.
 
 Correlating the pictures themselves says 0.9 for two views that share nothing but a bright ceiling
-over a dark floor. Here only what changes along a row within a few degrees counts, equally in bright
-and in dark places; a horizon, which fits at every offset, and mere noise count for little.
+over a dark floor. Here only what changes along a row within a few degrees counts, equally in
+bright and in dark places; a horizon, which fits at every offset, and noise count for little.
 """
 
 from collections.abc import Callable

@@ -62,7 +62,7 @@ class Tiles:
         side = 2 * self._reach + 1
         fits = np.zeros((len(origins), side, side), np.float32)
         self._known = np.zeros(fits.shape, bool)
-        for fit, known, origin, corner in zip(fits, self._known, origins, corners):
+        for fit, known, origin, corner in zip(fits, self._known, origins, corners, strict=True):
             _correlate(fit, known, facing, origin, corner, size)
         rays = surface.rays(*centers.T)
         # Rows far above and below the horizon are stretched: tiles count by their solid angle.
@@ -85,7 +85,7 @@ class Tiles:
         moves = self._center - self._reach + self._jacobian[:, :, 2:] @ tilt
         side = 2 * self._reach + 1
         total = np.zeros((side, side), np.float32)
-        for one, (dx, dy) in zip(self._likelihood, moves):
+        for one, (dx, dy) in zip(self._likelihood, moves, strict=True):
             total += cv2.warpAffine(one, np.array([[1, 0, -dx], [0, 1, -dy]]), (side, side))
         y, x = np.unravel_index(np.argmax(total), total.shape)
         step = np.array([x - self._reach, y - self._reach, *tilt], float)
