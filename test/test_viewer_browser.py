@@ -19,7 +19,7 @@ from fisheye_geometry.surface import Surface
 from panorama_stitch.viewer_server import ViewerServer
 from panorama_stitch.viewer_settings import ViewerSettings
 
-DEADLINE_S = 30.0
+DEADLINE_S = 60.0
 CLOSE_DEG = 1.0
 STRAIGHT_PX = 2.0
 """A line two pixels of the panorama wide, enlarged."""
@@ -235,6 +235,11 @@ def test_the_buttons_ask_for_the_token_where_others_can_look(browser, serve):
         page.until(lambda answer=answer: answer in page.text('answer'), answer)
 
 
+def moves(before, after):
+    """Whether two pictures of one size differ by more than noise."""
+    return before.shape == after.shape and abs(before.astype(int) - after).max() > 100
+
+
 def test_the_whole_rig_in_a_browser(browser, rig, watcher):
     rig.start_all(False, camera_parameters(None), frame_rate_hz=10.0)
     rig.start('viewer', port=0)
@@ -245,9 +250,8 @@ def test_the_whole_rig_in_a_browser(browser, rig, watcher):
     )
     page = Page(browser, said[0])
     page.until(lambda: re.match(r'[01]\.\d\d', page.text('overlap')), 'an overlap')
-    page.until(lambda: page.text('condition') == 'Live', 'a live picture')
-    first = page.shot('whole')
-    page.until(lambda: abs(page.shot('whole').astype(int) - first).max() > 100, 'a movement')
+    page.until(lambda: page.text('condition').startswith('Live'), 'a live picture')
+    page.until(lambda: moves(page.shot('whole'), page.shot('whole')), 'a movement')
     surface = surface_of(page.until(lambda: watcher.projection, 'the projection'))
     width = page.find('whole').size['width']
     x = 0.75 * surface.width - 0.5
@@ -257,8 +261,15 @@ def test_the_whole_rig_in_a_browser(browser, rig, watcher):
     page.press('c')
     page.until(lambda: 'confidence' in page.text('answer'), 'a calibration')
     page.press('s')
-    saved = page.until(lambda: list(browser.downloads.glob('panorama_*.jpg')), 'a snapshot')
-    assert cv2.imread(str(saved[0])).shape[:2] == (surface.height, surface.width)
+
+    def saved():
+        if 'no picture' in page.text('answer'):
+            # A loaded machine may take longer over a panorama than one may be old.
+            page.press('s')
+        return list(browser.downloads.glob('panorama_*.jpg'))
+
+    picture = cv2.imread(str(page.until(saved, 'a snapshot')[0]))
+    assert picture.shape[:2] == (watcher.projection.height, watcher.projection.width)
     rig.stop('left/capture')
     page.until(lambda: 'Left camera: no sign of life' in page.text('problems'), 'the loss')
     rig.stop('right/capture')

@@ -122,6 +122,8 @@ def test_no_other_file_can_be_had(serve, path):
         ({'Host': '[::1]:8080'}, 200),
         ({'Host': 'localhost', 'Origin': 'http://elsewhere.example'}, 403),
         ({'Host': 'localhost', 'Origin': 'null'}, 403),
+        ({'Host': 'localhost', 'Origin': 'http://['}, 403),
+        ({'Host': '[', 'Origin': 'http://['}, 403),
         ({'Host': 'localhost:80', 'Origin': 'http://localhost:80'}, 200),
     ],
 )
@@ -226,6 +228,14 @@ def test_the_number_of_browsers_is_bounded(serve):
                 assert 'the limit' in message.extra
 
     visit(scenario)
+
+
+@pytest.mark.parametrize('header', [b'Host: \xff\xfe', b'Host: localhost\r\nX-Token: \xff\xfe'])
+def test_bytes_that_are_no_text_are_refused(serve, header):
+    port = int(serve(host='0.0.0.0').url.split(':')[2].split('/')[0])
+    with socket.create_connection(('127.0.0.1', port), timeout=DEADLINE_S) as connection:
+        connection.sendall(b'POST /calibrate HTTP/1.1\r\n' + header + b'\r\n\r\n')
+        assert connection.recv(100).split()[1] in (b'400', b'403')
 
 
 @pytest.mark.parametrize('words', ['what', 'x' * 100_000])
