@@ -220,6 +220,23 @@ def test_a_phone_starts_by_looking_around(browser, serve):
     assert page.find('map').is_displayed()
     width = browser.execute_script('return document.documentElement.scrollWidth')
     assert width == 390, 'nothing sticks out'
+    before_deg = float(page.find('bearing').get_attribute('data-bearing-deg'))
+    for kind, places in (
+        ('touchStart', [(195, 300)]),
+        ('touchMove', [(95, 300)]),
+        ('touchStart', [(95, 300), (295, 300)]),
+        ('touchMove', [(55, 300), (335, 300)]),
+        ('touchEnd', []),
+    ):
+        points = [{'x': x, 'y': y, 'id': i} for i, (x, y) in enumerate(places)]
+        event = {'type': kind, 'touchPoints': points}
+        browser.execute_cdp_cmd('Input.dispatchTouchEvent', event)
+
+    def turned():
+        after_deg = float(page.find('bearing').get_attribute('data-bearing-deg'))
+        return after_deg > before_deg + 10
+
+    page.until(turned, 'a turn to the right')
 
 
 def test_the_buttons_ask_for_the_token_where_others_can_look(browser, serve):
