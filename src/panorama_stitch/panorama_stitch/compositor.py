@@ -25,6 +25,11 @@ class Compositor:
 
     Each view is drawn into the columns that are its own, and with a neighbour into the columns of
     a seam, where the two are blended.
+
+    Attributes
+    ----------
+    layout, views, gain
+        What it was made from.
     """
 
     def __init__(
@@ -46,14 +51,15 @@ class Compositor:
             Keeps the views equally bright; None: they are drawn as they are.
         """
         self.layout = layout
-        self._gain = gain
+        self.views = tuple(views)
+        self.gain = gain
         self._fades = [_Fade(i, layout, views, blend) for i in range(len(layout.seams))]
         edges = np.linspace(0, layout.surface.height, _SLABS_PER_THREAD * thread_count() + 1)
         slabs = [slice(*rows) for rows in pairwise(edges.round().astype(int))]
         self._parts: list[list[_Part]] = [[] for _ in slabs]
         share(
             [
-                partial(self._prepare, parts, rows, views)
+                partial(self._prepare, parts, rows)
                 for parts, rows in zip(self._parts, slabs, strict=True)
             ]
         )
@@ -73,16 +79,16 @@ class Compositor:
         ImageFormatError
             If a picture has not the size that its view was made for.
         """
-        if self._gain:
-            self._gain.update(images)
+        if self.gain:
+            self.gain.update(images)
         for fade in self._fades:
             fade.expect(out)
         share([partial(self._draw, parts, images, out) for parts in self._parts])
         for fade in self._fades:
             fade.blend(out)
 
-    def _prepare(self, parts: list['_Part'], rows: slice, views: Sequence[View]) -> None:
-        for index, (view, origin) in enumerate(zip(views, self.layout.origins, strict=True)):
+    def _prepare(self, parts: list['_Part'], rows: slice) -> None:
+        for index, (view, origin) in enumerate(zip(self.views, self.layout.origins, strict=True)):
             begin, end = self.layout.drawn(index)
             if end > begin:
                 size = end - begin, rows.stop - rows.start
@@ -95,8 +101,8 @@ class Compositor:
                 self._fades[index - 1].keep(rows, out)
             drawn = out[rows, columns]
             cut(images[index], drawn)
-            if self._gain:
-                self._gain.apply(index, drawn)
+            if self.gain:
+                self.gain.apply(index, drawn)
 
 
 class _Part(NamedTuple):

@@ -1,0 +1,79 @@
+"""Pairs of pictures whose cameras are known: of the synthetic rig, and of rigs in folders."""
+
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import radians
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from fisheye_capture.scene import Scene
+from fisheye_capture.synthetic import synthetic_lens
+from fisheye_geometry.camera_file import read_camera
+from fisheye_geometry.image_circle import ImageCircle
+from fisheye_geometry.lens import Lens
+from fisheye_geometry.remap import Turn
+from panorama_stitch.overlap import Overlap
+from panorama_stitch.settings import PanoramaSettings
+from panorama_stitch.stitcher import Stitcher
+
+SIDES = ('left', 'right')
+YAWS = radians(-70), radians(70)
+DATA = Path(os.environ.get('FISHEYE_DATA', Path(__file__).parents[2] / 'shared' / 'data'))
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two pictures (height, width, 3) uint8 BGR, from left to right, and their lenses."""
+
+    name: str
+    lenses: Sequence[Lens]
+    images: Sequence[np.ndarray]
+    is_synthetic: bool = False
+
+    def stitcher(self, settings: PanoramaSettings) -> Stitcher:
+        """Know the cameras, and the overlap: the true one of the synthetic rig, else measured."""
+        stitcher = Stitcher(SIDES)
+        for side, lens in zip(SIDES, self.lenses, strict=True):
+            stitcher.place(side, lens, settings.surface_of(lens), settings.interpolation)
+        if self.is_synthetic:
+            offset_px = (YAWS[1] - YAWS[0]) * stitcher.surfaces[0].focal_px
+            stitcher.overlaps = [Overlap('true', True, offset_px, 0.0)]
+        else:
+            stitcher.overlaps = stitcher.measure([self.images], settings, settings.method)
+        return stitcher
+
+
+def synthetic_pair(width: int, height: int, gains: Sequence[float] = (1.0, 1.0)) -> Pair:
+    """Take pictures of the synthetic world with two exposures."""
+    lens = synthetic_lens(width, height, radians(170))
+    images = [
+        Scene().view(lens, Turn(yaw_rad=yaw), gain).frame(0)
+        for yaw, gain in zip(YAWS, gains, strict=True)
+    ]
+    return Pair('synthetic', [lens, lens], images, is_synthetic=True)
+
+
+def folder_pair(folder: Path) -> Pair:
+    """Read left and right .png and .yaml."""
+    lenses, images = [], []
+    for side in SIDES:
+        image = cv2.imread(str(folder / f'{side}.png'))
+        lens = read_camera(folder / f'{side}.yaml').lens
+        circle = ImageCircle(lens)
+        circle.look(image)
+        lenses.append(lens.seen_within(circle.angle_rad))
+        images.append(image)
+    return Pair(folder.name, lenses, images)
+
+
+def real_pairs() -> list[Pair]:
+    """Read the rigs of `DATA` whose views overlap; none where the folder is absent."""
+    return [
+        folder_pair(path.parent)
+        for path in sorted((DATA / 'rigs').glob('*/truth.json'))
+        if json.loads(path.read_text())['overlaps']
+    ]
