@@ -15,7 +15,7 @@ _AREA_PICTURE_PX = 640 * 480
 _DARK_SHARE = 0.85
 """Darker than this share of the mean around it is dark: a shadow darkens both."""
 _WINDOWS = (1.6, 0.7, 0.3)
-"""Sizes of what is 'around', in diameters of the largest circle: each serves a range of circles."""
+"""Sizes of what is around, in diameters of the largest circle: each serves some circles."""
 _MIN_ROUNDNESS = 0.92
 _MIN_ASPECT = 0.15
 """A circle that is seen at 80 degrees from its axis is flatter; nothing can be measured there."""
@@ -25,6 +25,8 @@ _EDGE_PX, _EDGE = 2.0, (0.1, 0.3)
 """How far the blurred edge reaches beyond the radius, at least and at most in shares of it."""
 _RING = 0.2
 """Width of the ring of paper beyond that, in radii: the sheet may end close by."""
+_MAX_REFLECTED = 0.7
+"""Ink gives back less than this share of what the paper around it does."""
 _MAX_UNEVEN = 0.08
 """Paper around a circle that varies more than this, after its slope is removed, holds no plain
 light to compare the ink with."""
@@ -47,6 +49,9 @@ class Circles:
 
     def __len__(self):
         return len(self.centers)
+
+
+_NONE = Circles(np.empty((0, 2)), np.empty((0, 2, 2)))
 
 
 def area_limits(
@@ -91,11 +96,17 @@ def find_circles(gray: np.ndarray, min_area_px: float = 0.0, max_area_px: float 
         for particle in _particles(_dark(gray, size * largest), low, high)
     ]
     if not found:
-        return Circles(np.empty((0, 2)), np.empty((0, 2, 2)))
+        return _NONE
     centers, shapes = (np.array(part) for part in zip(*found, strict=True))
     new = _first_of_each(centers, shapes)
-    weighed = [_weigh(gray, *particle) for particle in zip(centers[new], shapes[new], strict=True)]
-    return Circles(*(np.array(part) for part in zip(*weighed, strict=True)))
+    printed = [
+        measured
+        for center, shape in zip(centers[new], shapes[new], strict=True)
+        if (measured := _weigh(gray, center, shape))
+    ]
+    if not printed:
+        return _NONE
+    return Circles(*(np.array(part) for part in zip(*printed, strict=True)))
 
 
 def _dark(gray: np.ndarray, window_px: float) -> np.ndarray:
@@ -137,7 +148,10 @@ def _first_of_each(centers: np.ndarray, shapes: np.ndarray) -> np.ndarray:
 
 
 def _weigh(gray: np.ndarray, center: np.ndarray, shape: np.ndarray):
-    """Measure a circle again, each pixel weighed by the ink in it: edges are grey, not binary."""
+    """Measure a circle again, each pixel weighed by the ink in it: edges are grey, not binary.
+
+    Gives its centre and shape, or None for a dark spot that no white paper surrounds.
+    """
     edge = 1 + np.clip(_EDGE_PX / (2 * np.sqrt(np.linalg.eigvalsh(shape)[0])), *_EDGE)
     reach = 2 * (edge + _RING) * np.sqrt(np.diag(shape))
     first = np.maximum(np.floor(center - reach), 0).astype(int)
@@ -148,6 +162,8 @@ def _weigh(gray: np.ndarray, center: np.ndarray, shape: np.ndarray):
     inverse = np.linalg.inv(shape)
     radius = np.sqrt(inverse[0, 0] * x * x + 2 * inverse[0, 1] * x * y + inverse[1, 1] * y * y) / 2
     paper = (radius > edge) & (radius < edge + _RING)
+    if np.median(patch[radius < _INSIDE]) > _MAX_REFLECTED * np.median(patch[paper]):
+        return None
     plane = np.stack([np.ones(patch.shape), x, y], axis=-1)
     light = plane @ np.linalg.lstsq(plane[paper], patch[paper], rcond=None)[0]
     if light.min() <= 0 or np.std(patch[paper] / light[paper]) > _MAX_UNEVEN:

@@ -12,7 +12,7 @@ from fisheye_undistort.target import Target
 
 _TOLERANCE = 0.3
 """How far a neighbour may lie from where it is expected, as a share of the smallest step."""
-_MIN_SHARE = 0.9
+_MIN_SHARE = 0.93
 """Fewer circles than this share of the grid are not taken for the grid."""
 _SEEDS = 3
 """How often a circle is reached before it is no start any more: a start may be a stray."""
@@ -38,10 +38,10 @@ def order_grid(circles: Circles, target: Target) -> tuple[np.ndarray, np.ndarray
         If there is no such grid.
     """
     neighbourhood = _Neighbourhood(circles, target)
-    best, largest = None, {}
+    best, largest = None, {-1: (0, 0)}
     visits = np.zeros(len(circles), int)
     for seed in range(len(circles)):
-        if visits[seed] == _SEEDS:
+        if visits[seed] >= _SEEDS:
             continue
         grown = [neighbourhood.grow(seed, start) for start in neighbourhood.hypotheses(seed)]
         for cells, mismatch in grown:
@@ -177,7 +177,12 @@ def _occupied(cells: np.ndarray) -> np.ndarray:
 
 def _what_is_there(circles: Circles, cells: dict[int, tuple], target: Target) -> str:
     wanted = f'expected {target.rows} rows and {target.columns} columns'
-    if len(cells) < 4:
+    lines = [np.unique(axis, return_counts=True) for axis in np.array(list(cells.values())).T]
+    # A line of its own is a stray's, not the sheet's.
+    lines = [line[count > 1] for line, count in lines]
+    if not all(len(line) for line in lines):
         return f'no grid among {len(circles)} dark round particles; {wanted}'
-    columns, rows = np.ptp(np.array(list(cells.values())), axis=0) + 1
-    return f'a grid of {len(cells)} circles, {rows} x {columns} (rows x columns), found; {wanted}'
+    columns, rows = (np.ptp(line) + 1 for line in lines)
+    if target.kind == 'acircles':
+        columns //= 2
+    return f'a grid of circles, {rows} x {columns} (rows x columns), found; {wanted}'

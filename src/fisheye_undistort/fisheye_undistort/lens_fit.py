@@ -1,4 +1,4 @@
-"""Least squares over a lens and the poses of a target, with analytic derivatives."""
+"""Least squares over a lens, the bulge of the sheet and its poses, with analytic derivatives."""
 
 from dataclasses import dataclass
 
@@ -6,27 +6,30 @@ import cv2
 import numpy as np
 from scipy.optimize import least_squares
 
-from fisheye_geometry.lens import FisheyeLens
+from fisheye_undistort.sheet_model import INTRINSICS, UNKNOWNS, bend, curves, project
 
-INTRINSICS = (
-    'focal_x_px', 'focal_y_px', 'center_x_px', 'center_y_px', 'k1', 'k2', 'k3', 'k4',
-)
+
+def _alone(*names: str) -> np.ndarray:
+    """Directions (len(names), len(UNKNOWNS)) along which each changes without the others."""
+    return np.eye(len(UNKNOWNS))[[UNKNOWNS.index(name) for name in names]]
+
+
 GROUPS = {
-    'focal length': ((1, 1, 0, 0, 0, 0, 0, 0),),
-    'principal point': ((0, 0, 1, 0, 0, 0, 0, 0), (0, 0, 0, 1, 0, 0, 0, 0)),
-    'aspect ratio': ((0, 1, 0, 0, 0, 0, 0, 0),),
-    'k1': ((0, 0, 0, 0, 1, 0, 0, 0),),
-    'k2': ((0, 0, 0, 0, 0, 1, 0, 0),),
-    'k3': ((0, 0, 0, 0, 0, 0, 1, 0),),
-    'k4': ((0, 0, 0, 0, 0, 0, 0, 1),),
+    'focal length': _alone('focal_x_px') + _alone('focal_y_px'),
+    'principal point': _alone('center_x_px', 'center_y_px'),
+    'k1': _alone('k1'),
+    'k2': _alone('k2'),
+    'k3': _alone('k3'),
+    'k4': _alone('k4'),
+    'aspect ratio': _alone('focal_y_px'),
+    'bulge': _alone('bulge_xx_mm', 'bulge_xy_mm', 'bulge_yy_mm'),
 }
-"""What can be fitted together or left as it is: directions in the space of the intrinsics."""
+"""What is fitted together or left as it is: directions in the space of the unknowns."""
 
 _POSE = 6
 _OUTLIER_PX = 1.0
 """Beyond this a residual counts linearly: one wrong point must not pull the lens."""
 _MAX_EVALUATIONS = 100
-_EVEN_POWERS = 2.0 * np.arange(1, 5)
 _UNDETERMINED = 1e-12
 """Added to the scaled normal equations: what no point tells gets a huge deviation."""
 
@@ -52,30 +55,40 @@ class View:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A lens and the poses of the target before it, as good as known so far.
+    """A lens and the sheets before it, as good as known so far.
 
     Attributes
     ----------
-    intrinsics
-        (8,) in the order of `INTRINSICS`.
+    unknowns
+        (11,) in the order of `UNKNOWNS`.
     poses
         (V, 6) rotation vector and translation, target to camera, rad and mm.
     residuals_px
         One (N, 2) array for each view: found minus predicted.
     covariance
-        (8, 8) of the intrinsics; 0 for what was not fitted.
+        (11, 11) of the unknowns; 0 for what was not fitted.
     cost
-        Twice the robust cost, px^2.
+        The robust cost, about the sum of squared residuals, px^2.
     free
         Names of the `GROUPS` that were fitted.
     """
 
-    intrinsics: np.ndarray
+    unknowns: np.ndarray
     poses: np.ndarray
     residuals_px: tuple[np.ndarray, ...] = ()
     covariance: np.ndarray | None = None
     cost: float = np.inf
     free: tuple[str, ...] = ()
+
+    @property
+    def intrinsics(self) -> np.ndarray:
+        """(8,) in the order of `INTRINSICS`."""
+        return self.unknowns[: len(INTRINSICS)]
+
+    @property
+    def bulge_mm(self) -> np.ndarray:
+        """(3,) as `bend` takes it."""
+        return self.unknowns[len(INTRINSICS) :]
 
     @property
     def rms_px(self) -> np.ndarray:
@@ -88,21 +101,10 @@ def rms(residuals_px: np.ndarray) -> float:
     return float(np.sqrt(np.mean(np.sum(residuals_px**2, axis=-1))))
 
 
-def lens_of(intrinsics: np.ndarray, size: tuple[int, int]) -> FisheyeLens:
-    """Build the lens for pictures of (width, height)."""
-    focal_x, focal_y, center_x, center_y, *distortion = map(float, intrinsics)
-    return FisheyeLens(*size, focal_x, focal_y, center_x, center_y, tuple(distortion))
-
-
-def to_camera(pose: np.ndarray, points_mm: np.ndarray) -> np.ndarray:
-    """Points (..., 3) of the target in the camera's frame, for one pose (6,)."""
-    return points_mm @ cv2.Rodrigues(pose[:3])[0].T + pose[3:]
-
-
 def fit(views: list[View], points_mm: np.ndarray, start: Estimate, nominal: np.ndarray,
         free: tuple[str, ...], bias_px: list[np.ndarray] | None = None,
         tolerance: float = 1e-8) -> Estimate:
-    """Fit the free groups of intrinsics and every pose.
+    """Fit the free unknowns and every pose.
 
     Parameters
     ----------
@@ -111,9 +113,9 @@ def fit(views: list[View], points_mm: np.ndarray, start: Estimate, nominal: np.n
     points_mm
         (M, 3) of the target.
     start
-        Intrinsics and poses to begin with.
+        Unknowns and poses to begin with.
     nominal
-        (8,) intrinsics; those that are not free have these values.
+        (11,) unknowns; those that are not free have these values.
     free
         Names of `GROUPS`.
     bias_px
@@ -126,45 +128,46 @@ def fit(views: list[View], points_mm: np.ndarray, start: Estimate, nominal: np.n
         problem.residuals, problem.pack(start), problem.jacobian, method='lm', x_scale='jac',
         ftol=tolerance, max_nfev=_MAX_EVALUATIONS,
     )
-    intrinsics, poses = problem.unpack(solution.x)
+    unknowns, poses = problem.unpack(solution.x)
     misses = problem.misses_px(solution.x)
     return Estimate(
-        intrinsics, poses,
+        unknowns, poses,
         residuals_px=tuple(-part for part in np.split(misses, problem.splits)),
         covariance=problem.covariance(solution), cost=2 * solution.cost, free=free,
     )
 
 
 class _Problem:
-    """Residuals and their derivatives as functions of one vector: free intrinsics, then poses."""
+    """Residuals and their derivatives as functions of one vector: free unknowns, then poses."""
 
     def __init__(self, views, points_mm, nominal, free, bias_px):
         counts = [len(view.ids) for view in views]
         self.splits = np.cumsum(counts)[:-1]
         self._view = np.repeat(np.arange(len(views)), counts)
-        self._points = np.concatenate([points_mm[view.ids] for view in views])
+        self._ids = np.concatenate([view.ids for view in views])
+        self._points = points_mm
         self._found = np.concatenate([view.points_px for view in views])
         if bias_px is not None:
             self._found = self._found - np.concatenate(bias_px)
-        self._basis = np.array([row for name in free for row in GROUPS[name]], float).T
+        self._basis = np.concatenate([GROUPS[name] for name in free]).T
         self._nominal = nominal
 
     def pack(self, estimate):
-        """Give the vector whose intrinsics are nearest to those of an estimate."""
-        change = estimate.intrinsics - self._nominal
-        intrinsics = np.linalg.lstsq(self._basis, change, rcond=None)[0]
-        return np.concatenate([intrinsics, estimate.poses.ravel()])
+        """Give the vector whose unknowns are nearest to those of an estimate."""
+        change = estimate.unknowns - self._nominal
+        free = np.linalg.lstsq(self._basis, change, rcond=None)[0]
+        return np.concatenate([free, estimate.poses.ravel()])
 
     def unpack(self, vector):
-        """Intrinsics (8,) and poses (V, 6)."""
+        """Unknowns (11,) and poses (V, 6)."""
         count = self._basis.shape[1]
         return self._nominal + self._basis @ vector[:count], vector[count:].reshape(-1, _POSE)
 
     def misses_px(self, vector):
         """Predicted minus found, (N, 2)."""
-        intrinsics, poses = self.unpack(vector)
-        points, _ = self._to_camera(poses)
-        return project(intrinsics, points)[0] - self._found
+        unknowns, poses = self.unpack(vector)
+        points, _, _ = self._to_camera(unknowns, poses)
+        return project(unknowns, points)[0] - self._found
 
     def residuals(self, vector):
         """Misses (2 N,) px, damped so that the sum of their squares is a robust cost."""
@@ -172,28 +175,31 @@ class _Problem:
 
     def jacobian(self, vector):
         """Derivatives of `residuals`, (2 N, len(vector))."""
-        intrinsics, poses = self.unpack(vector)
-        points, by_turn = self._to_camera(poses)
-        pixels, by_intrinsics, by_point = project(intrinsics, points)
+        unknowns, poses = self.unpack(vector)
+        points, by_turn, by_bulge = self._to_camera(unknowns, poses)
+        pixels, by_intrinsics, by_point = project(unknowns, points)
+        by_unknowns = np.concatenate([by_intrinsics, by_point @ by_bulge], axis=-1)
         count = self._basis.shape[1]
         jacobian = np.zeros((len(points), 2, len(vector)))
-        jacobian[:, :, :count] = by_intrinsics @ self._basis
+        jacobian[:, :, :count] = by_unknowns @ self._basis
         by_pose = np.concatenate([by_point @ by_turn, by_point], axis=-1)
         columns = count + _POSE * self._view[:, None] + np.arange(_POSE)
         np.put_along_axis(jacobian, columns[:, None, :].repeat(2, axis=1), by_pose, axis=-1)
         jacobian *= _damp(pixels - self._found)[1][..., None]
         return jacobian.reshape(-1, len(vector))
 
-    def _to_camera(self, poses):
-        """Points (N, 3) in the camera's frame and their derivatives (N, 3, 3) by the turns."""
+    def _to_camera(self, unknowns, poses):
+        """Points (N, 3) in the camera's frame, and derivatives (N, 3, 3) by turn and bulge."""
         pairs = [cv2.Rodrigues(pose[:3]) for pose in poses]
         rotation = np.array([matrix for matrix, _ in pairs])[self._view]
         slopes = np.array([slope.reshape(3, 3, 3) for _, slope in pairs])[self._view]
-        points = np.einsum('nij,nj->ni', rotation, self._points) + poses[self._view, 3:]
-        return points, np.einsum('nkij,nj->nik', slopes, self._points)
+        sheet = bend(self._points, unknowns[len(INTRINSICS) :])[self._ids]
+        points = np.einsum('nij,nj->ni', rotation, sheet) + poses[self._view, 3:]
+        by_turn = np.einsum('nkij,nj->nik', slopes, sheet)
+        return points, by_turn, rotation[:, :, 2:] * curves(self._points)[self._ids, None]
 
     def covariance(self, solution):
-        """Covariance (8, 8) of the intrinsics, from the Jacobian and the scatter of residuals."""
+        """Covariance (11, 11), from the Jacobian and the scatter of the residuals."""
         scale = np.linalg.norm(solution.jac, axis=0)
         scale[scale == 0] = 1.0
         information = (solution.jac / scale).T @ (solution.jac / scale)
@@ -214,45 +220,3 @@ def _damp(misses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     # misses^2 / (root + 1) is 2 (root - 1) without the cancellation near 0.
     shrink = np.sqrt(2 / (root + 1))
     return misses * shrink, 1 / (root * shrink)
-
-
-def project(intrinsics: np.ndarray, points: np.ndarray):
-    """Project points as `FisheyeLens` does, with derivatives and without an end of the field.
-
-    Parameters
-    ----------
-    intrinsics
-        (8,) in the order of `INTRINSICS`.
-    points
-        (N, 3) in the camera's frame.
-
-    Returns
-    -------
-    pixels : ndarray
-        (N, 2) px.
-    by_intrinsics : ndarray
-        (N, 2, 8) derivatives.
-    by_point : ndarray
-        (N, 2, 3) derivatives.
-    """
-    x, y, z = points.T
-    focal, center, coefficients = intrinsics[:2], intrinsics[2:4], intrinsics[4:]
-    side = np.maximum(np.hypot(x, y), 1e-12)
-    angle = np.arctan2(side, z)
-    powers = angle[:, None] ** _EVEN_POWERS
-    growth = 1 + powers @ coefficients
-    slope = 1 + powers @ (coefficients * (_EVEN_POWERS + 1))
-    toward = np.stack([x, y], axis=-1) / side[:, None]
-    plane = toward * (angle * growth)[:, None]
-    by_intrinsics = np.zeros((len(points), 2, len(intrinsics)))
-    by_intrinsics[:, [0, 1], [0, 1]] = plane
-    by_intrinsics[:, [0, 1], [2, 3]] = 1.0
-    by_intrinsics[:, :, 4:] = (focal * toward)[..., None] * (angle[:, None] * powers)[:, None]
-    # Away from the axis the radius changes by the slope; around it the angle stays.
-    squared = side**2 + z**2
-    outward = (slope * z / squared)[:, None, None] * toward[:, :, None] * toward[:, None]
-    across = np.eye(2) - toward[:, :, None] * toward[:, None]
-    outward += (angle * growth / side)[:, None, None] * across
-    inward = -(slope * side / squared)[:, None] * toward
-    by_point = focal[:, None] * np.concatenate([outward, inward[..., None]], axis=-1)
-    return plane * focal + center, by_intrinsics, by_point

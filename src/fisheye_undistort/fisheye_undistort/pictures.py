@@ -1,0 +1,114 @@
+"""Read the pictures that a calibration is made from: files, folders, globs and videos."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from glob import glob
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from fisheye_geometry.errors import SourceError
+
+HALVES = ('left', 'right')
+
+_PICTURES = ('.png', '.jpg', '.jpeg', '.bmp', '.tif', '.tiff', '.webp', '.pgm', '.ppm')
+_VIDEOS = ('.mp4', '.avi', '.mkv', '.mov', '.webm', '.m4v', '.mjpg', '.mjpeg')
+_LOOKS_PER_SECOND = 10
+"""Frames of a video that are looked at; a hand does not hold a sheet still for less."""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture and what to call it.
+
+    Attributes
+    ----------
+    name
+        File name, of a video with the frame's number.
+    gray
+        (height, width) uint8.
+    moving
+        Whether it is one of a sequence, in which the target may be on its way.
+    """
+
+    name: str
+    gray: np.ndarray
+    moving: bool = False
+
+
+def read_pictures(paths: Iterable[str | Path], half: str = '') -> Iterator[Picture]:
+    """Read pictures one after another.
+
+    Parameters
+    ----------
+    paths
+        Pictures, folders of pictures, globs, videos.
+    half
+        `left` or `right` of pictures that a stereo camera puts side by side; '' for all of it.
+
+    Raises
+    ------
+    SourceError
+        If there is nothing, or something that cannot be read; the sentence names it.
+    """
+    for path in _expand(paths):
+        frames = _frames(path) if path.suffix.lower() in _VIDEOS else [_picture(path)]
+        for picture in frames:
+            yield Picture(picture.name, cut(picture.gray, half), picture.moving)
+
+
+def cut(gray: np.ndarray, half: str) -> np.ndarray:
+    """Give one half of a side-by-side picture, or all of it."""
+    middle = gray.shape[1] // 2
+    parts = {'': gray, 'left': gray[:, :middle], 'right': gray[:, middle:]}
+    return np.ascontiguousarray(parts[half])
+
+
+def _expand(paths: Iterable[str | Path]) -> list[Path]:
+    found = []
+    for path in paths:
+        if Path(path).is_dir():
+            inside = sorted(p for p in Path(path).iterdir() if p.suffix.lower() in _PICTURES)
+            if not inside:
+                raise SourceError(f'the folder {path} has no pictures ({", ".join(_PICTURES)})')
+            found += inside
+        elif Path(path).exists():
+            found.append(Path(path))
+        else:
+            matching = sorted(map(Path, glob(str(path), recursive=True)))
+            if not matching:
+                raise SourceError(f'{path} is not there, neither a file nor a folder nor a glob')
+            found += matching
+    return found
+
+
+def _picture(path: Path) -> Picture:
+    try:
+        content = np.frombuffer(path.read_bytes(), np.uint8)
+    except OSError as error:
+        raise SourceError(f'{path} cannot be read: {error.strerror}') from error
+    gray = cv2.imdecode(content, cv2.IMREAD_GRAYSCALE) if len(content) else None
+    if gray is None:
+        raise SourceError(f'{path} is not a picture that can be read')
+    return Picture(path.name, gray)
+
+
+def _frames(path: Path) -> Iterator[Picture]:
+    video = cv2.VideoCapture(str(path))
+    try:
+        rate = video.get(cv2.CAP_PROP_FPS)
+        step = max(1, round(rate / _LOOKS_PER_SECOND)) if 0 < rate < 1000 else 1
+        number = 0
+        while video.grab():
+            if number % step == 0:
+                read, frame = video.retrieve()
+                if not read:
+                    break
+                gray = frame if frame.ndim == 2 else cv2.cvtColor(frame, cv2.COLOR_BGR2GRAY)
+                yield Picture(f'{path.name} frame {number}', gray, moving=True)
+            number += 1
+    finally:
+        video.release()
+    if number == 0:
+        raise SourceError(f'{path} is not a video that can be read')

@@ -1,0 +1,91 @@
+"""Where a lens sees the points of a sheet: the model that is fitted, with its derivatives."""
+
+import cv2
+import numpy as np
+
+from fisheye_geometry.lens import FisheyeLens
+
+INTRINSICS = ('focal_x_px', 'focal_y_px', 'center_x_px', 'center_y_px', 'k1', 'k2', 'k3', 'k4')
+UNKNOWNS = (*INTRINSICS, 'bulge_xx_mm', 'bulge_xy_mm', 'bulge_yy_mm')
+"""What all views have in common."""
+
+_EVEN_POWERS = 2.0 * np.arange(1, 5)
+
+
+def lens_of(unknowns: np.ndarray, size: tuple[int, int]) -> FisheyeLens:
+    """Build the lens for pictures of (width, height)."""
+    focal_x, focal_y, center_x, center_y, *distortion = map(float, unknowns[: len(INTRINSICS)])
+    return FisheyeLens(*size, focal_x, focal_y, center_x, center_y, tuple(distortion))
+
+
+def to_camera(pose: np.ndarray, points_mm: np.ndarray) -> np.ndarray:
+    """Points (..., 3) of the target in the camera's frame, for one pose (6,)."""
+    return points_mm @ cv2.Rodrigues(pose[:3])[0].T + pose[3:]
+
+
+def bend(points_mm: np.ndarray, bulge_mm: np.ndarray) -> np.ndarray:
+    """Points (M, 3) of a sheet that is not quite flat.
+
+    Paper and board never are, and the lens would be bent to make up for it: 1 mm on a 25 cm sheet
+    moved the focal length by 1.5 % (after Strobl and Hirzinger, "More accurate pinhole camera
+    calibration with imperfect planar target", 2011, doi 10.1109/ICCVW.2011.6130369).
+
+    Parameters
+    ----------
+    points_mm
+        (M, 3) as they were printed.
+    bulge_mm
+        (3,) depth at the outermost points with x^2, x y and y^2.
+    """
+    bent = points_mm.copy()
+    bent[:, 2] += curves(points_mm) @ bulge_mm
+    return bent
+
+
+def curves(points_mm: np.ndarray) -> np.ndarray:
+    """Derivatives (M, 3) of the depths of `bend` by the bulge."""
+    x, y = (points_mm[:, :2] / np.abs(points_mm[:, :2]).max()).T
+    return np.stack([x * x, x * y, y * y], axis=-1)
+
+
+def project(unknowns: np.ndarray, points: np.ndarray):
+    """Project points as `FisheyeLens` does, with derivatives and without an end of the field.
+
+    Parameters
+    ----------
+    unknowns
+        (8,) or more, in the order of `UNKNOWNS`.
+    points
+        (N, 3) in the camera's frame.
+
+    Returns
+    -------
+    pixels : ndarray
+        (N, 2) px.
+    by_intrinsics : ndarray
+        (N, 2, 8) derivatives.
+    by_point : ndarray
+        (N, 2, 3) derivatives.
+    """
+    x, y, z = points.T
+    focal, center = unknowns[:2], unknowns[2:4]
+    coefficients = unknowns[4 : len(INTRINSICS)]
+    side = np.maximum(np.hypot(x, y), 1e-12)
+    angle = np.arctan2(side, z)
+    powers = angle[:, None] ** _EVEN_POWERS
+    growth = 1 + powers @ coefficients
+    slope = 1 + powers @ (coefficients * (_EVEN_POWERS + 1))
+    toward = np.stack([x, y], axis=-1) / side[:, None]
+    plane = toward * (angle * growth)[:, None]
+    by_intrinsics = np.zeros((len(points), 2, len(INTRINSICS)))
+    by_intrinsics[:, [0, 1], [0, 1]] = plane
+    by_intrinsics[:, [0, 1], [2, 3]] = 1.0
+    by_intrinsics[:, :, 4:] = (focal * toward)[..., None] * (angle[:, None] * powers)[:, None]
+    # Away from the axis the radius changes by the slope; around it the angle stays.
+    squared = side**2 + z**2
+    radial = toward[:, :, None] * toward[:, None]
+    by_side = (slope * z / squared)[:, None, None] * radial
+    by_side += (angle * growth / side)[:, None, None] * (np.eye(2) - radial)
+    by_depth = -(slope * side / squared)[:, None] * toward
+    by_point = focal[:, None] * np.concatenate([by_side, by_depth[..., None]], axis=-1)
+    return plane * focal + center, by_intrinsics, by_point

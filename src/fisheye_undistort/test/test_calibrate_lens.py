@@ -1,0 +1,118 @@
+import cv2
+import numpy as np
+import pytest
+
+from fisheye_geometry.camera_file import read_camera
+from fisheye_undistort.calibrate_lens import GOOD, NOTHING_WRITTEN, POOR, main
+
+FOCAL = 0.003
+
+
+@pytest.fixture(scope='module')
+def shots(paper_pictures, tmp_path_factory):
+    folder = tmp_path_factory.mktemp('shots')
+    for number, picture in enumerate(paper_pictures):
+        cv2.imwrite(str(folder / f'shot{number:02}.png'), picture)
+    return folder
+
+
+def refused(capsys, *arguments):
+    """Run a command that must fail; give its sentence."""
+    assert main([str(argument) for argument in arguments]) == NOTHING_WRITTEN
+    told = capsys.readouterr().err
+    assert told.startswith('calibrate_lens: ')
+    assert told.count('\n') == 1
+    return told
+
+
+def test_a_good_calibration(shots, paper_lens, tmp_path, capsys):
+    output, plot = tmp_path / 'left.yaml', tmp_path / 'report.png'
+    arguments = [str(shots), '--name', 'left', '-o', str(output), '--plot', str(plot)]
+    assert main(arguments) == GOOD
+    camera = read_camera(output)
+    assert camera.name == 'left'
+    assert camera.lens.ros_model == 'equidistant'
+    assert (camera.lens.width, camera.lens.height) == (640, 480)
+    assert abs(camera.lens.focal_x_px / paper_lens.focal_x_px - 1) < FOCAL
+    assert cv2.imread(str(plot)).shape[1] > 1000
+    assert 'verdict  good' in capsys.readouterr().out
+
+
+def test_a_poor_one_is_written_all_the_same(shots, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main([str(shots / 'shot01.png'), '--name', 'rear']) == POOR
+    assert read_camera(tmp_path / 'rear.yaml').name == 'rear'
+    assert 'verdict  poor: only 1 view' in capsys.readouterr().out
+
+
+def test_a_video(paper_pictures, tmp_path):
+    path = tmp_path / 'wave.avi'
+    video = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*'MJPG'), 10, (640, 480), False)
+    for picture in paper_pictures:
+        for _ in range(3):
+            video.write(picture)
+    video.release()
+    assert main([str(path), '-o', str(tmp_path / 'camera.yaml')]) == GOOD
+
+
+def test_half_of_a_side_by_side_picture(paper_pictures, tmp_path):
+    for number, picture in enumerate(paper_pictures[:6]):
+        both = np.hstack([np.zeros_like(picture), picture])
+        cv2.imwrite(str(tmp_path / f'{number}.png'), both)
+    output = tmp_path / 'right.yaml'
+    assert main([str(tmp_path), '--half', 'right', '-o', str(output)]) in (GOOD, POOR)
+    assert read_camera(output).lens.width == 640
+
+
+@pytest.mark.parametrize('name', ['sheet.pdf', 'sheet.svg', 'sheet.png'])
+def test_print_draws_the_sheet_and_nothing_else(name, tmp_path, capsys):
+    assert main(['--print', str(tmp_path / name), '--target', 'charuco']) == GOOD
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+    assert 'charuco 5 x 7' in capsys.readouterr().out
+
+
+def test_no_target_anywhere(tmp_path, capsys):
+    cv2.imwrite(str(tmp_path / 'wall.png'), np.full((480, 640), 180, np.uint8))
+    assert 'none of 1 pictures' in refused(capsys, tmp_path)
+
+
+def test_pictures_of_different_sizes(shots, tmp_path, capsys):
+    cv2.imwrite(str(tmp_path / 'small.png'), np.zeros((240, 320), np.uint8))
+    told = refused(capsys, shots, tmp_path / 'small.png')
+    assert 'small.png has 320x240 px' in told
+
+
+def test_a_wrong_number_of_rows(shots, capsys):
+    assert '3 x 3 (rows x columns), found; expected 4 rows' in refused(capsys, shots, '--rows', 4)
+
+
+def test_an_unreadable_file(shots, tmp_path, capsys):
+    (tmp_path / 'broken.jpg').write_bytes(b'broken')
+    assert 'broken.jpg is not a picture' in refused(capsys, shots, tmp_path / 'broken.jpg')
+
+
+def test_all_views_alike(shots, tmp_path, capsys):
+    picture = (shots / 'shot01.png').read_bytes()
+    for number in range(4):
+        (tmp_path / f'{number}.png').write_bytes(picture)
+    assert 'all 4 views of the target are alike' in refused(capsys, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'told'),
+    [
+        ([], 'nothing to do'),
+        (['--rows', 'many'], "argument --rows: invalid int value: 'many'"),
+        (['x.png', '--target', 'stars'], "invalid choice: 'stars'"),
+        (['x.png', '--radius-mm', '90'], 'radius_mm is 90'),
+        (['--print', 'sheet.docx'], "'sheet.docx'"),
+        (['nowhere.png'], 'nowhere.png is not there'),
+    ],
+)
+def test_bad_arguments_are_a_sentence_too(arguments, told, capsys):
+    assert told in refused(capsys, *arguments)
+
+
+def test_the_file_cannot_be_written(shots, capsys):
+    told = refused(capsys, shots / 'shot01.png', '-o', '/proc/nowhere/camera.yaml')
+    assert '/proc/nowhere/camera.yaml cannot be written' in told

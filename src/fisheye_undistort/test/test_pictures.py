@@ -1,0 +1,79 @@
+import cv2
+import numpy as np
+import pytest
+
+from fisheye_geometry.errors import SourceError
+from fisheye_undistort.pictures import read_pictures
+
+
+def grey(value, width=64, height=48):
+    return np.full((height, width), value, np.uint8)
+
+
+def names(*paths, half=''):
+    return [picture.name for picture in read_pictures(paths, half)]
+
+
+@pytest.fixture
+def folder(tmp_path):
+    for value in (30, 10, 20):
+        cv2.imwrite(str(tmp_path / f'shot{value}.png'), grey(value))
+    (tmp_path / 'notes.txt').write_text('no picture')
+    return tmp_path
+
+
+def test_a_folder_gives_its_pictures_in_order(folder):
+    assert names(folder) == ['shot10.png', 'shot20.png', 'shot30.png']
+
+
+def test_globs_and_files_go_together(folder):
+    assert names(folder / 'shot30.png', f'{folder}/*1*.png') == ['shot30.png', 'shot10.png']
+
+
+def test_colour_becomes_grey(tmp_path):
+    cv2.imwrite(str(tmp_path / 'red.png'), np.full((4, 6, 3), (0, 0, 200), np.uint8))
+    (picture,) = read_pictures([tmp_path / 'red.png'])
+    assert picture.gray.shape == (4, 6)
+    assert picture.gray.dtype == np.uint8
+
+
+@pytest.mark.parametrize(('half', 'value'), [('left', 10), ('right', 200)])
+def test_halves_of_a_side_by_side_picture(half, value, tmp_path):
+    cv2.imwrite(str(tmp_path / 'both.png'), np.hstack([grey(10), grey(200)]))
+    (picture,) = read_pictures([tmp_path / 'both.png'], half)
+    assert picture.gray.shape == (48, 64)
+    assert np.all(picture.gray == value)
+
+
+def test_a_video_gives_ten_frames_a_second(tmp_path):
+    path = tmp_path / 'wave.avi'
+    video = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*'MJPG'), 30, (64, 48), False)
+    for value in range(30):
+        video.write(grey(8 * value))
+    video.release()
+    pictures = list(read_pictures([path]))
+    assert len(pictures) == 10
+    assert all(picture.moving for picture in pictures)
+    assert pictures[3].name == 'wave.avi frame 9'
+    assert abs(pictures[3].gray.mean() - 72) < 8
+
+
+@pytest.mark.parametrize(
+    ('name', 'content', 'told'),
+    [
+        ('missing.png', None, 'missing.png is not there'),
+        ('broken.png', b'nothing like a picture', 'broken.png is not a picture'),
+        ('empty.jpg', b'', 'empty.jpg is not a picture'),
+        ('broken.mp4', b'nothing like a video', 'broken.mp4 is not a video'),
+    ],
+)
+def test_what_cannot_be_read_is_named(name, content, told, tmp_path):
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(SourceError, match=told):
+        list(read_pictures([tmp_path / name]))
+
+
+def test_a_folder_without_pictures(tmp_path):
+    with pytest.raises(SourceError, match='has no pictures'):
+        list(read_pictures([tmp_path]))
