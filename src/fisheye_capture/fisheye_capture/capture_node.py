@@ -122,9 +122,9 @@ class CaptureNode(Node):
         if grabber.note:
             report.add(WARN, grabber.note)
         if self._fault:
-            report.add(WARN, self._fault)
+            report.add(ERROR if self._camera else WARN, self._fault)
         report.values['source'] = self._settings.source
-        report.values['rate Hz'] = grabber.rate_hz
+        report.values['rate Hz'] = grabber.rate.hz
         report.values['pictures'] = grabber.frames
         report.values['pictures skipped'] = grabber.skipped + self._publishing.dropped
 

@@ -1,20 +1,17 @@
 """Grabbing: a thread that reads a source for ever, and gets it back when it is lost."""
 
-import time
-from collections import deque
 from collections.abc import Callable
 from threading import Event, Thread
 
+from fisheye_capture.rate import Rate
 from fisheye_capture.settings import CaptureSettings
 from fisheye_capture.source import Frame, Source, SourceEndedError, SourceLostError
 from fisheye_capture.sources import open_source
-from fisheye_geometry.errors import SourceError
+from fisheye_geometry.errors import FisheyeError
 
 _FIRST_WAIT_S = 0.25
 """Before the first attempt to reopen; doubled before each further one."""
 _STOP_TIMEOUT_S = 1.5
-_RATE_FRAMES = 60
-"""Frames over which the rate is measured."""
 
 
 class Grabber:
@@ -30,6 +27,8 @@ class Grabber:
         Vain attempts to open the source since the last frame.
     frames
         Frames handed over so far.
+    rate : Rate
+        Of these frames.
     """
 
     def __init__(
@@ -46,7 +45,8 @@ class Grabber:
         settings
             What to open.
         on_frame
-            Called with each frame in the reading thread; the sooner it returns, the better.
+            Called with each frame in the reading thread; the sooner it returns, the better. A
+            `FisheyeError` that it raises is the source's fault, which is opened anew.
         on_change
             Called in the reading thread with `reason` when the frames stop and when they come.
 
@@ -58,7 +58,7 @@ class Grabber:
         self._settings = settings
         self._on_frame = on_frame
         self._on_change = on_change
-        self._arrivals_s = deque(maxlen=_RATE_FRAMES)
+        self.rate = Rate()
         self._stopping = Event()
         self._thread = Thread(target=self._run, name=f'grab {settings.camera_name}', daemon=True)
         self.reason = 'waiting for the first picture'
@@ -81,13 +81,6 @@ class Grabber:
         """Frames of the open source that were due while the one before was still in work."""
         source = self._source
         return source.skipped if source else 0
-
-    @property
-    def rate_hz(self) -> float:
-        """Frames a second of late; sinks while none come."""
-        if len(self._arrivals_s) < 2:
-            return 0.0
-        return (len(self._arrivals_s) - 1) / (time.monotonic() - self._arrivals_s[0])
 
     def start(self) -> None:
         """Begin to read."""
@@ -113,7 +106,7 @@ class Grabber:
             except SourceEndedError as error:
                 wait_s = None
                 self._change(str(error))
-            except SourceError as error:
+            except FisheyeError as error:
                 came = self.frames > frames
                 self.attempts += not came
                 wait_s = min(_FIRST_WAIT_S if came else 2 * wait_s, self._settings.reconnect_max_s)
@@ -125,11 +118,11 @@ class Grabber:
     def _read(self, source):
         while not self._stopping.is_set():
             frame = source.read()
+            self._on_frame(frame)
             self.frames += 1
-            self._arrivals_s.append(time.monotonic())
+            self.rate.count()
             self.attempts = 0
             self._change('')
-            self._on_frame(frame)
 
     def _change(self, reason):
         if reason != self.reason and not self._stopping.is_set():

@@ -1,12 +1,14 @@
 """Grabbing: frames while there are any, and a lost camera that comes back."""
 
+from threading import Event
+
 import pytest
 from mjpeg_server import MjpegServer, jpeg
 
 from fisheye_capture import grabber as grabber_module
 from fisheye_capture.grabber import Grabber
 from fisheye_capture.source import Frame, Source, SourceEndedError, SourceLostError
-from fisheye_geometry.errors import SourceError
+from fisheye_geometry.errors import ImageFormatError, SourceError
 
 
 @pytest.fixture
@@ -14,9 +16,9 @@ def grab(settings):
     """Start a grabber; gives it with the list that its frames are added to."""
     grabbers = []
 
-    def start(source, **changes):
+    def start(source, take=None, **changes):
         frames = []
-        grabber = Grabber(settings(source, **changes), frames.append)
+        grabber = Grabber(settings(source, **changes), take or frames.append)
         grabbers.append(grabber)
         grabber.start()
         return grabber, frames
@@ -31,7 +33,7 @@ def test_it_hands_over_frames_and_knows_the_camera(grab, wait_until):
     wait_until(lambda: len(frames) > 10, 'frames')
     assert grabber.camera.lens.width == 640
     assert grabber.reason == ''
-    assert grabber.rate_hz == pytest.approx(50, rel=0.5)
+    assert grabber.rate.hz == pytest.approx(50, rel=0.5)
     grabber.stop()
     assert len(frames) == grabber.frames
 
@@ -63,6 +65,22 @@ def test_an_http_camera_is_lost_and_comes_back(grab, wait_until):
     assert frames[count].image.mean() > 170
     assert (grabber.reason, grabber.attempts) == ('', 0)
     camera.stop()
+
+
+def test_a_camera_whose_pictures_are_refused_is_opened_anew(grab, wait_until):
+    refuses = Event()
+    refuses.set()
+
+    def take(frame):
+        if refuses.is_set():
+            raise ImageFormatError('the picture has the wrong size')
+
+    grabber, _ = grab('synthetic', take, reconnect_max_s=0.1)
+    wait_until(lambda: grabber.attempts > 1, 'further attempts')
+    assert (grabber.reason, grabber.frames) == ('the picture has the wrong size', 0)
+    refuses.clear()
+    wait_until(lambda: grabber.frames, 'frames')
+    assert (grabber.reason, grabber.attempts) == ('', 0)
 
 
 def test_garbage_from_a_camera_is_never_handed_over(grab, wait_until):

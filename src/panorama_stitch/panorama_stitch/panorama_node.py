@@ -43,9 +43,12 @@ class PanoramaNode(PanoramaBase):
         super()._report(report)
         for eye in self._eyes:
             grabber = eye.grabber
-            report.values[f'{eye.name} rate Hz'] = grabber.rate_hz
+            report.values[f'{eye.name} skipped'] = grabber.skipped
             if grabber.reason:
-                report.add(ERROR, f'{eye.name}: {grabber.reason}')
+                report.add(
+                    ERROR,
+                    f'{eye.name}: {grabber.reason} (attempts to reopen: {grabber.attempts})',
+                )
 
 
 class _Eye:
@@ -64,7 +67,7 @@ class _Eye:
         self._settings = CaptureSettings(**named, **shared)
         self._raw = ImagePublisher(node, f'{name}/image_raw')
         self._frames = 0
-        self.grabber = Grabber(self._settings, self._take)
+        self.grabber = Grabber(self._settings, self._take, on_change=self._tell)
         camera = calibration_of(self._settings.camera_info_url) or self.grabber.camera
         if camera is None:
             raise CameraFileError(
@@ -91,6 +94,12 @@ class _Eye:
             header = Header(stamp=stamp_of(frame.stamp_ns), frame_id=self._settings.frame_id)
             message = to_message(frame.image, encoding, header)
             self._raw.publish(message, frame.image, self._node.settings.jpeg_quality)
+
+    def _tell(self, reason: str) -> None:
+        if reason:
+            self._node.warn(f'{self.name}: no pictures: {reason}')
+        else:
+            self._node.get_logger().info(f'{self.name}: pictures come')
 
 
 def main() -> int:
