@@ -13,7 +13,8 @@ from fisheye_bridge.qos import ADJUSTABLE, IMAGE, IMAGE_INPUT
 from fisheye_geometry.errors import FisheyeError
 
 TRANSPORTS = ('raw', 'compressed')
-_WARNING_PAUSE_S = 5.0
+WARNING_PAUSE_S = 5.0
+"""Between two warnings of the same kind."""
 
 
 class ImagePublisher:
@@ -91,5 +92,5 @@ class ImageSubscription:
             self.refused += 1
             self._node.get_logger().warning(
                 f'a picture on {self._topic} was dropped: {error}',
-                throttle_duration_sec=_WARNING_PAUSE_S,
+                throttle_duration_sec=WARNING_PAUSE_S,
             )

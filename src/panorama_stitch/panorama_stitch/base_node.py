@@ -19,16 +19,17 @@ from fisheye_bridge.parameters import Parameters
 from fisheye_bridge.projection import projection_of
 from fisheye_bridge.qos import LATCHED
 from fisheye_bridge.stamps import stamp_of
-from fisheye_bridge.topics import ImagePublisher
+from fisheye_bridge.topics import WARNING_PAUSE_S, ImagePublisher
+from fisheye_capture.rate import Rate
 from fisheye_geometry.errors import FisheyeError, SettingError
 from panorama_stitch import overlap
 from panorama_stitch.compositor import Compositor
+from panorama_stitch.figures import figures
 from panorama_stitch.live import LiveStitcher
 from panorama_stitch.settings import PanoramaOutputSettings
 from panorama_stitch.stale import write_age
 
 FRAME_ID = 'panorama_optical_frame'
-_WARNING_PAUSE_S = 5.0
 _LATENCIES = 300
 
 
@@ -45,13 +46,13 @@ class PanoramaBase(Node):
             )
         self._buffer: ImageBuffer | None = None
         self._encoding = ''
-        self._published = 0
+        self._published, self._rate = 0, Rate()
         self._latencies_ms: deque[float] = deque(maxlen=_LATENCIES)
         self._image = ImagePublisher(self, 'panorama/image')
         self._projection = self.create_publisher(Projection, 'panorama/projection', LATCHED)
         self._overlaps = self.create_publisher(Overlaps, 'panorama/overlap', LATCHED)
         self.live = LiveStitcher(
-            self.settings, publish=self._publish, changed=self._announce, warn=self._warn
+            self.settings, publish=self._publish, changed=self._announce, warn=self.warn
         )
         self.create_service(CalibrateOverlap, 'calibrate_overlap', self._calibrate)
         self._diagnostics = Diagnostics(self, self._report)
@@ -87,13 +88,14 @@ class PanoramaBase(Node):
         size = surface.width, surface.height, self._encoding
         if self._buffer is None or not self._buffer.fits(*size):
             self._buffer = ImageBuffer(*size)
-        compositor.compose(images, self._buffer.array)
+        compositor.compose(images, self._buffer.array, are_live=not ages_s)
         for camera, age_s in ages_s.items():
             columns = compositor.layout.drawn(self.settings.cameras.index(camera))
             write_age(self._buffer.array, columns, camera, age_s)
         self._buffer.message.header = _header(stamp_ns)
         self._image.publish(self._buffer.message, self._buffer.array, self.settings.jpeg_quality)
         self._published += 1
+        self._rate.count()
         self._latencies_ms.append((self.get_clock().now().nanoseconds - stamp_ns) / 1e6)
 
     def _announce(self) -> None:
@@ -127,28 +129,30 @@ class PanoramaBase(Node):
             for result, names, surface in zip(results, pairwise(cameras), surfaces, strict=False)
         ]
 
-    def _warn(self, sentence: str) -> None:
-        self.get_logger().warning(sentence, throttle_duration_sec=_WARNING_PAUSE_S)
+    def warn(self, sentence: str) -> None:
+        """Log a warning, but not one after the other."""
+        self.get_logger().warning(sentence, throttle_duration_sec=WARNING_PAUSE_S)
 
     def _report(self, report: Report) -> None:
-        if self.live.compositor is None:
+        live = self.live
+        if live.compositor is None:
             report.add(ERROR, 'no panorama yet: waiting for frames of every camera')
-        else:
-            for result in self.live.stitcher.in_use(self.settings):
-                if not result.found:
-                    report.add(WARN, 'no overlap: frames are side by side')
-        ages_s = self.live.ages_s()
+        if not all(result.found for result in live.overlaps):
+            report.add(WARN, 'no overlap: frames are side by side')
+        if live.unpaired_s > self.settings.stale_after_s:
+            report.add(
+                ERROR,
+                f'pictures come, but for {live.unpaired_s:.0f} s none that belong together: '
+                f'the stamps of the cameras are {live.pairing.spread_ns / 1e9:.3g} s apart '
+                f'(max_pair_skew_s is {self.settings.max_pair_skew_s:g}); are their clocks equal?',
+            )
+        ages_s = live.ages_s()
         all_stale = len(ages_s) == len(self.settings.cameras)
         for camera, age_s in ages_s.items():
             report.add(ERROR if all_stale else WARN, f'{camera}: no picture for {age_s:.0f} s')
+        report.values['rate Hz'] = self._rate.hz
         report.values['panoramas published'] = self._published
-        report.values['pairs overtaken'] = self.live.dropped
-        for camera, count in self.live.pairing.unpaired.items():
-            report.values[f'{camera} unpaired'] = count
-        skews_ms = np.array(self.live.pairing.skews_ns) / 1e6
-        if len(skews_ms):
-            report.values['skew median ms'] = float(np.median(skews_ms))
-            report.values['skew worst ms'] = float(skews_ms.max())
+        report.values.update(figures(live))
         if self._latencies_ms:
             for share in (50, 95, 99):
                 value = float(np.percentile(self._latencies_ms, share))

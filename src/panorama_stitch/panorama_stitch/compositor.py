@@ -64,7 +64,9 @@ class Compositor:
             ]
         )
 
-    def compose(self, images: Sequence[np.ndarray], out: np.ndarray) -> None:
+    def compose(
+        self, images: Sequence[np.ndarray], out: np.ndarray, *, are_live: bool = True
+    ) -> None:
         """Draw a panorama.
 
         Parameters
@@ -73,13 +75,15 @@ class Compositor:
             A picture of each camera, (height, width[, channels]) uint8.
         out
             (surface.height, surface.width[, channels]) uint8, overwritten.
+        are_live
+            Whether the brightness of the pictures tells anything of the cameras now.
 
         Raises
         ------
         ImageFormatError
             If a picture has not the size that its view was made for.
         """
-        if self.gain:
+        if self.gain and are_live:
             self.gain.update(images)
         for fade in self._fades:
             fade.expect(out)

@@ -9,10 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from fisheye_capture.newest import Newest
+from fisheye_capture.rate import Rate
 from fisheye_geometry.errors import FisheyeError
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.surface import Surface
 from panorama_stitch.compositor import Compositor
+from panorama_stitch.overlap import Overlap
 from panorama_stitch.pairing import FramePairing
 from panorama_stitch.preparation import Preparation
 from panorama_stitch.settings import PanoramaOutputSettings
@@ -48,6 +50,8 @@ class LiveStitcher:
         What is known of the cameras.
     pairing : FramePairing
         What waits for its partner.
+    rates : dict of Rate
+        At which each camera's frames come.
     """
 
     def __init__(
@@ -74,10 +78,12 @@ class LiveStitcher:
         """
         self.stitcher = Stitcher(settings.cameras)
         self.pairing = FramePairing(settings.cameras, round(settings.max_pair_skew_s * 1e9))
+        self.rates = {camera: Rate() for camera in settings.cameras}
         self._preparation = Preparation(self.stitcher, settings, changed, warn)
         self._publish, self._warn = publish, warn
         self._lock = Lock()
         self._last = {camera: _Last(None, monotonic()) for camera in settings.cameras}
+        self._paired_s = monotonic()
         self._dark: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         self._composing = Newest(self._compose, 'compose')
 
@@ -85,6 +91,18 @@ class LiveStitcher:
     def compositor(self) -> Compositor | None:
         """What composes the panoramas now, None before the first."""
         return self._preparation.compositor
+
+    @property
+    def overlaps(self) -> list[Overlap]:
+        """What is in use between neighbours, [] before the first panorama."""
+        if self.compositor is None:
+            return []
+        return self.stitcher.in_use(self._preparation.settings)
+
+    @property
+    def unpaired_s(self) -> float:
+        """How long ago the last frames belonged together, s; 0 while a camera is stale."""
+        return 0.0 if self.ages_s() else monotonic() - self._paired_s
 
     @property
     def dropped(self) -> int:
@@ -106,13 +124,16 @@ class LiveStitcher:
             If it is not of the size that the camera is known to give.
         """
         self.stitcher.check(camera, image)
+        self.rates[camera].count()
         with self._lock:
             self._last[camera] = _Last(image, monotonic())
             pair = self.pairing.add(camera, stamp_ns, image)
             if pair is not None:
+                self._paired_s = monotonic()
                 images = [member.frame for member in pair]
                 self._composing.put(_Group(images, min(member.stamp_ns for member in pair), {}))
             elif ages_s := self.ages_s():
+                self._paired_s = monotonic()
                 self._go_on_without(ages_s, camera, stamp_ns)
 
     def place(

@@ -81,6 +81,12 @@ class FramePairing:
         """How many frames of each camera found no partner."""
         return {camera: track.unpaired for camera, track in self._tracks.items()}
 
+    @property
+    def spread_ns(self) -> int:
+        """How far apart the newest stamps of the cameras lie; 0 before all have one."""
+        newest = [track.last_ns for track in self._tracks.values()]
+        return 0 if None in newest else max(newest) - min(newest)
+
     def clear(self) -> None:
         """Forget what waits."""
         for track in self._tracks.values():

@@ -8,6 +8,7 @@ from fisheye_bridge.running import run
 from fisheye_bridge.stamps import ns_of
 from fisheye_bridge.topics import ImageSubscription
 from fisheye_geometry.errors import FisheyeError
+from fisheye_geometry.surface import Surface
 from panorama_stitch.base_node import PanoramaBase
 from panorama_stitch.settings import StitchSettings
 
@@ -17,21 +18,45 @@ class StitchNode(PanoramaBase):
 
     def __init__(self, **kwargs):
         super().__init__('stitch', StitchSettings, **kwargs)
-        self._inputs = [self._listen(camera) for camera in self.settings.cameras]
+        self._eyes = [_Eye(self, camera) for camera in self.settings.cameras]
 
-    def _listen(self, camera: str) -> ImageSubscription:
-        def take_image(image, encoding, header):
-            self.take(camera, ns_of(header.stamp), image, encoding)
+    def _report(self, report) -> None:
+        super()._report(report)
+        for eye in self._eyes:
+            report.values[f'{eye.name} refused'] = eye.pictures.refused
 
-        def take_projection(message):
-            try:
-                surface = surface_of(message)
-                self.live.place(camera, surface, surface)
-            except FisheyeError as error:
-                self._warn(f'{camera}/projection refused: {error}')
 
-        self.create_subscription(Projection, f'{camera}/projection', take_projection, LATCHED)
-        return ImageSubscription(self, f'{camera}/image_rect', take_image)
+class _Eye:
+    """One camera of the node: its corrected pictures, and what they show."""
+
+    def __init__(self, node: StitchNode, name: str):
+        self.name = name
+        self._node = node
+        self._is_placed, self._announced = False, None
+        node.create_subscription(Projection, f'{name}/projection', self._take_projection, LATCHED)
+        self.pictures = ImageSubscription(node, f'{name}/image_rect', self._take_image)
+
+    def _take_projection(self, message) -> None:
+        """Take the first projection at once, another one when a picture of its size comes."""
+        try:
+            surface = surface_of(message)
+        except FisheyeError as error:
+            self._node.warn(f'{self.name}/projection refused: {error}')
+            return
+        if self._is_placed:
+            self._announced = surface
+        else:
+            self._place(surface)
+
+    def _take_image(self, image, encoding, header) -> None:
+        surface = self._announced
+        if surface and image.shape[:2] == (surface.height, surface.width):
+            self._place(surface)
+        self._node.take(self.name, ns_of(header.stamp), image, encoding)
+
+    def _place(self, surface: Surface) -> None:
+        self._node.live.place(self.name, surface, surface)
+        self._is_placed, self._announced = True, None
 
 
 def main() -> int:

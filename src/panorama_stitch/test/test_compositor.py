@@ -111,6 +111,17 @@ def test_every_blend_shows_the_scene_without_allocating_pictures(pictures, blend
     assert peak < SMALL_OBJECTS_BYTES
 
 
+def test_pictures_that_are_not_live_teach_nothing_about_brightness(pictures):
+    views = [View(LENS, SURFACE)] * 2
+    layout = lay_out(views, [(OFFSET, 0.0)], fade_px=10.0, crop='valid')
+    compositor = Compositor(layout, views, gain=GainCompensation(layout, views, pictures))
+    out = np.empty((layout.surface.height, layout.surface.width, 3), np.uint8)
+    before = compositor.gain.factors
+    for _ in range(50):
+        compositor.compose([pictures[0] // 3, pictures[1]], out, are_live=False)
+    np.testing.assert_array_equal(compositor.gain.factors, before)
+
+
 def test_both_ways_give_the_same_picture(pictures):
     raw = composed(*views_of(pictures, corrected=False), offset_px=round(OFFSET), crop='none')[1]
     rect = composed(*views_of(pictures, corrected=True), offset_px=round(OFFSET), crop='none')[1]

@@ -93,3 +93,11 @@ def test_more_cameras_than_two(cameras):
     arrivals = [(camera, k * PERIOD + i) for k in range(10) for i, camera in enumerate(cameras)]
     _, groups = pair_all(arrivals, cameras=cameras)
     assert groups == [[33 * k] * len(cameras) for k in range(10)]
+
+
+def test_how_far_the_clocks_are_apart_is_known():
+    pairing, groups = pair_all([('left', 0)])
+    assert pairing.spread_ns == 0
+    pairing, groups = pair_all([('left', 0), ('right', 700 * MS), ('left', PERIOD)])
+    assert pairing.spread_ns == 700 * MS - PERIOD
+    assert not groups
