@@ -11,9 +11,9 @@ from fisheye_bridge.parameters import Parameters
 from fisheye_bridge.projection import projection_of
 from fisheye_bridge.qos import IMAGE, LATCHED
 from fisheye_bridge.running import run
-from fisheye_bridge.topics import ImageSubscription
+from fisheye_bridge.topics import WARNING_PAUSE_S, ImageSubscription
 from fisheye_geometry.background import Background
-from fisheye_geometry.errors import FisheyeError
+from fisheye_geometry.errors import CalibrationError, FisheyeError
 from fisheye_geometry.image_circle import ImageCircle
 from fisheye_undistort.correction import Correction
 from fisheye_undistort.settings import UndistortSettings
@@ -26,33 +26,47 @@ class UndistortNode(Node):
         super().__init__('undistort', **kwargs)
         self._background = Background(self._refuse)
         self._camera_info = self._camera = self._circle = self._asked = None
-        self._correction = self._buffer = None
-        self._refusal = ''
+        self._correction = self._buffer = self._picture_size = None
+        self._refusal, self._refusal_is_over = '', False
         self._frames = self._corrected = 0
         self._declared = Parameters(self, UndistortSettings, on_change=self._rebuild)
         self._image = self.create_publisher(Image, 'image_rect', IMAGE)
         self._projection = self.create_publisher(Projection, 'projection', LATCHED)
-        self.create_subscription(CameraInfo, 'camera_info', self._take_camera_info, IMAGE)
         self._input = ImageSubscription(
             self, 'image_raw', self._take_image, transport=self._declared.settings.transport
         )
+        self.create_subscription(CameraInfo, 'camera_info', self._take_camera_info, IMAGE)
         self._diagnostics = Diagnostics(self, self._report)
 
     def _take_camera_info(self, message):
         """Have the maps rebuilt, but only if the camera is another one than before."""
         content = (message.width, message.height, message.distortion_model, *message.k, *message.d)
         if repr(content) == self._camera_info:
+            self._refusal_is_over = True
+            if not self._frames:
+                # No picture comes that could show where the lens's light ends.
+                self._rebuild(self._declared.settings)
             return
-        self._camera_info = repr(content)
         try:
-            self._camera = camera_of(message)
+            camera = self._checked(camera_of(message))
         except FisheyeError as error:
             self._refuse(error)
             return
-        self._header = message.header
-        self._circle = ImageCircle(self._camera.lens)
+        self._camera_info, self._camera, self._header = repr(content), camera, message.header
+        self._circle = ImageCircle(camera.lens)
         self._frames = 0
-        self._rebuild(self._declared.settings)
+
+    def _checked(self, camera):
+        """Give the camera back if it fits the pictures and there is a surface for it."""
+        size = camera.lens.width, camera.lens.height
+        if self._picture_size not in (None, size):
+            raise CalibrationError(
+                '{}x{} px do not fit the pictures, which have {}x{} px'.format(
+                    *size, *self._picture_size
+                )
+            )
+        self._declared.settings.surface_of(camera.lens)
+        return camera
 
     def _rebuild(self, settings):
         """Have the maps built in the background; frames use the old ones until then."""
@@ -70,11 +84,14 @@ class UndistortNode(Node):
         self._projection.publish(projection_of(self._correction.surface, self._header))
 
     def _refuse(self, error):
-        self._refusal = str(error)
+        self._refusal, self._refusal_is_over = str(error), False
         kept = '; the last good calibration stays in use' if self._correction else ''
-        self.get_logger().warning(f'camera_info refused: {error}{kept}')
+        self.get_logger().warning(
+            f'camera_info refused: {error}{kept}', throttle_duration_sec=WARNING_PAUSE_S
+        )
 
     def _take_image(self, image, encoding, header):
+        self._picture_size = image.shape[1::-1]
         self._look_for_circle(image)
         correction = self._correction
         if correction is None or not self._image.get_subscription_count():
@@ -91,7 +108,7 @@ class UndistortNode(Node):
         """Look where the lens's light ends; ever more seldom, since it does not change."""
         self._frames += 1
         power_of_two = self._frames & (self._frames - 1) == 0
-        if self._circle and power_of_two and self._circle.look(image):
+        if self._circle and power_of_two and (self._circle.look(image) or self._frames == 1):
             self._rebuild(self._declared.settings)
 
     def _report(self, report):
@@ -99,6 +116,8 @@ class UndistortNode(Node):
             report.add(ERROR, self._refusal or 'waiting for camera_info')
         elif self._refusal:
             report.add(WARN, f'camera_info refused: {self._refusal}')
+        if self._refusal_is_over:
+            self._refusal = ''
         if self._input.refused:
             report.values['pictures refused'] = self._input.refused
         report.values['pictures corrected'] = self._corrected

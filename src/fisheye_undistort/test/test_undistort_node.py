@@ -2,6 +2,7 @@
 
 import time
 
+import cv2
 import numpy as np
 import pytest
 import rclpy
@@ -55,6 +56,8 @@ class Bench:
             for key, value in wrong.items():
                 setattr(info, key, value)
             self._info.publish(info)
+        if picture is None:
+            return
         message = to_message(picture, 'bgr8' if picture.ndim == 3 else 'mono8', header)
         message.encoding = encoding
         self._raw.publish(message)
@@ -128,6 +131,8 @@ def test_the_maps_are_rebuilt_only_for_a_real_change(make_bench):
         {'distortion_model': 'unheard_of'},
         {'d': [0.1, 0.2]},
         {'width': 0},
+        {'width': 320, 'height': 240},
+        {'k': [1e300, 0.0, 79.5, 0.0, 1e300, 59.5, 0.0, 0.0, 1.0]},
         {'binning_x': 4},
     ],
 )
@@ -136,7 +141,22 @@ def test_a_nonsense_camera_info_leaves_the_good_one_in_use(make_bench, wrong):
     bench.until(lambda: bench.pictures, 'a picture')
     bench.pictures.clear()
     bench.until(lambda: len(bench.pictures) > 3, 'pictures still', **wrong)
+    bench.until(lambda: len(bench.pictures) > 6, 'pictures with the good one again')
     assert len(bench.projections) == 1
+
+
+def test_a_dark_rim_is_known_before_the_first_projection_is_told(make_bench):
+    y, x = np.mgrid[:120, :160]
+    circle = np.where(np.hypot(x - 79.5, y - 59.5) < 50, 200, 0).astype(np.uint8)
+    bench = make_bench()
+    bench.until(lambda: len(bench.pictures) > 6, 'pictures', picture=cv2.merge([circle] * 3))
+    (projection,) = bench.projections
+    assert projection.width < UndistortSettings().surface_of(LENS).width
+
+
+def test_a_projection_is_told_even_before_pictures_come(make_bench):
+    bench = make_bench()
+    bench.until(lambda: bench.projections, 'a projection', picture=None)
 
 
 def test_unusable_pictures_are_dropped_and_counted(make_bench):
