@@ -8,11 +8,14 @@ import numpy as np
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
+from fisheye_bridge.picture_head import size_of
 from fisheye_geometry.errors import ImageFormatError
 from fisheye_geometry.lens import MAX_PICTURE_SIDE_PX
 
 CHANNELS = {'bgr8': 3, 'rgb8': 3, 'mono8': 1}
 """The encodings that the nodes work in and publish."""
+_MAX_PIXELS = 50_000_000
+"""Of a coded picture: a few bytes can claim to be more than fits into memory."""
 
 
 @dataclass(frozen=True)
@@ -160,20 +163,22 @@ def from_jpeg(message: CompressedImage) -> tuple[np.ndarray, str]:
     Raises
     ------
     ImageFormatError
-        If the data is no picture.
+        If the data is no picture, or one that is too large.
     """
     coded = np.frombuffer(message.data, np.uint8)
+    width, height = size_of(coded)
+    if not 1 <= width * height <= _MAX_PIXELS:
+        raise ImageFormatError(
+            f'a picture of {width}x{height} px; expected up to {_MAX_PIXELS / 1e6:g} million px'
+        )
     grey = message.format.startswith('mono8')
     flag = cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR
     try:
-        image = cv2.imdecode(coded, flag) if coded.size else None
+        image = cv2.imdecode(coded, flag)
     except cv2.error:
         image = None
     if image is None:
-        raise ImageFormatError(
-            f"{coded.size} bytes of format '{message.format:.40}' are no picture; "
-            'expected JPEG or PNG'
-        )
+        raise ImageFormatError(f'a broken picture of {width}x{height} px ({coded.size} bytes)')
     return image, 'mono8' if grey else 'bgr8'
 
 

@@ -1,5 +1,7 @@
 """Images: every encoding, padding, no copy where none is needed, and nonsense refused."""
 
+from array import array
+
 import cv2
 import numpy as np
 import pytest
@@ -159,7 +161,13 @@ def test_jpeg_is_what_image_transport_reads(encoding, form):
 def test_broken_jpeg_is_refused(data):
     message = CompressedImage(format='jpeg')
     message.data.frombytes(data)
-    with pytest.raises(
-        ImageFormatError, match=f"{len(data)} bytes of format 'jpeg' are no picture"
-    ):
+    with pytest.raises(ImageFormatError, match=f'{len(data)} bytes are no picture'):
+        from_jpeg(message)
+
+
+def test_a_coded_picture_that_claims_to_be_huge_is_refused_before_it_is_decoded():
+    message = to_jpeg(np.zeros((48, 64, 3), np.uint8), 'bgr8', Header(), 80)
+    at = bytes(message.data).index(b'\xff\xc0') + 5
+    message.data[at : at + 4] = array('B', (30_000).to_bytes(2, 'big') * 2)
+    with pytest.raises(ImageFormatError, match='30000x30000 px; expected up to 50 million px'):
         from_jpeg(message)

@@ -5,7 +5,7 @@ Frames follow REP-103 (z forward, x right, y down); integer pixel coordinates ar
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from math import hypot, isfinite, pi
+from math import hypot, pi
 from typing import ClassVar
 
 import numpy as np
@@ -14,6 +14,8 @@ from fisheye_geometry.errors import CalibrationError
 
 MAX_PICTURE_SIDE_PX = 16384
 """Larger pictures do not fit the 16-bit maps of OpenCV's remap."""
+_LARGEST = 1e6
+"""No number of a real lens comes near it, and none below it overflows."""
 
 
 @dataclass(frozen=True)
@@ -46,12 +48,15 @@ class Lens(ABC):
                 )
         for name in ('focal_x_px', 'focal_y_px', 'visible_angle_rad'):
             value = getattr(self, name)
-            if not (isfinite(value) and value > 0):
-                raise CalibrationError(f'{name} is {value}; expected a finite number above 0')
-        for value in (self.center_x_px, self.center_y_px, self.skew_px, *self.distortion):
-            if not isfinite(value):
+            if not 0 < value <= _LARGEST:
                 raise CalibrationError(
-                    f'principal point, skew and distortion must be finite numbers; found {value}'
+                    f'{name} is {value}; expected a number above 0, up to {_LARGEST:g}'
+                )
+        for value in (self.center_x_px, self.center_y_px, self.skew_px, *self.distortion):
+            if not abs(value) <= _LARGEST:
+                raise CalibrationError(
+                    'principal point, skew and distortion must be finite numbers up to '
+                    f'{_LARGEST:g}; found {value}'
                 )
         if len(self.distortion) not in self.coefficient_counts:
             expected = ' or '.join(map(str, self.coefficient_counts))

@@ -5,7 +5,7 @@ a shift of columns by `focal_px` times the angle; on a `rectilinear` one it is n
 """
 
 from dataclasses import dataclass, replace
-from math import isfinite, pi
+from math import pi
 
 import numpy as np
 
@@ -62,6 +62,8 @@ _KINDS = {
 SURFACES = tuple(_KINDS)
 _MAX_PIXELS = 50_000_000
 """Above it the maps of a single camera would take more than 300 MB."""
+_LARGEST_PX = 1e6
+"""No length on a picture that can be made is larger."""
 SCALES = ('preserve_area', 'fit')
 
 
@@ -93,9 +95,9 @@ class Surface:
             raise GeometryError(
                 f"surface '{self.kind}' is not known; expected one of {', '.join(SURFACES)}"
             )
-        if not (isfinite(self.focal_px) and self.focal_px > 0):
+        if not 0 < self.focal_px <= _LARGEST_PX:
             raise GeometryError(
-                f'focal_px is {self.focal_px}; expected a finite number of pixels above 0'
+                f'focal_px is {self.focal_px}; expected more than 0, up to {_LARGEST_PX:g} px'
             )
         sides = self.width, self.height
         if not (
@@ -108,6 +110,11 @@ class Surface:
                 f'1 to {MAX_PICTURE_SIDE_PX} px and all {_MAX_PIXELS / 1e6:g} million at the most '
                 '(see hfov_deg, vfov_deg, width, height)'
             )
+        for name in ('center_x_px', 'center_y_px'):
+            if not abs(getattr(self, name)) <= _LARGEST_PX:
+                raise GeometryError(
+                    f'{name} is {getattr(self, name)}; expected at most {_LARGEST_PX:g} px'
+                )
 
     @property
     def turns_are_shifts(self) -> bool:

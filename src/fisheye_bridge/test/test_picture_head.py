@@ -1,0 +1,34 @@
+"""Sizes of coded pictures, against those that OpenCV coded."""
+
+import cv2
+import numpy as np
+import pytest
+
+from fisheye_bridge.picture_head import size_of
+from fisheye_geometry.errors import ImageFormatError
+
+PICTURE = np.random.default_rng(1).integers(0, 256, (37, 53, 3), np.uint8)
+
+
+@pytest.mark.parametrize('suffix', ['.jpg', '.png'])
+@pytest.mark.parametrize(
+    'options', [(), (cv2.IMWRITE_JPEG_PROGRESSIVE, 1), (cv2.IMWRITE_JPEG_RST_INTERVAL, 2)]
+)
+@pytest.mark.parametrize('image', [PICTURE, PICTURE[..., 0]], ids=['color', 'grey'])
+def test_the_size_is_in_the_head(suffix, options, image):
+    coded = cv2.imencode(suffix, image, options if suffix == '.jpg' else ())[1]
+    assert size_of(coded) == (53, 37)
+
+
+def test_bytes_that_fill_up_are_skipped():
+    coded = cv2.imencode('.jpg', PICTURE)[1].tobytes()
+    filled = coded[:2] + b'\xff\xff\xff' + coded[2:]
+    assert size_of(np.frombuffer(filled, np.uint8)) == (53, 37)
+
+
+@pytest.mark.parametrize('suffix', ['.jpg', '.png', '.bmp'])
+def test_what_ends_too_early_or_is_something_else_is_refused(suffix):
+    coded = cv2.imencode(suffix, PICTURE)[1]
+    for count in range(0, 24):
+        with pytest.raises(ImageFormatError, match=f'{count} bytes are no picture; expected JPEG'):
+            size_of(coded[:count])
