@@ -96,13 +96,14 @@ def render_view(lens: Lens, target: Target, pose: Pose, look: Look = Look(), see
         (lens.height, lens.width) uint8.
     """
     random = np.random.default_rng(seed)
-    rays, lit = _rays(lens)
+    lit = _lit(lens)
     picture = lit * look.backdrop * _mottle(lit.shape, random)
     top, bottom, left, right = _window(lens, target, pose)
     if top < bottom and left < right:
-        fine = (slice(edge[0] * _SUBPIXELS, edge[1] * _SUBPIXELS) for edge in
-                ((top, bottom), (left, right)))
-        ink, covered = _sheet_seen(rays[tuple(fine)], target, pose)
+        y, x = (np.arange(*edge, 1 / _SUBPIXELS) + (1 / _SUBPIXELS - 1) / 2
+                for edge in ((top, bottom), (left, right)))
+        rays, seen = lens.unproject(np.stack(np.meshgrid(x, y), axis=-1))
+        ink, covered = _sheet_seen(rays, seen, target, pose)
         sheet = look.ink * ink + look.paper * (covered - ink)
         window = picture[top:bottom, left:right]
         window[:] = window * (1 - covered) + sheet
@@ -136,18 +137,18 @@ def _window(lens: Lens, target: Target, pose: Pose) -> tuple[int, int, int, int]
     return first[1], last[1], first[0], last[0]
 
 
-def _sheet_seen(rays: np.ndarray, target: Target, pose: Pose) -> tuple[np.ndarray, np.ndarray]:
+def _sheet_seen(rays, seen, target: Target, pose: Pose) -> tuple[np.ndarray, np.ndarray]:
     """Shares of ink and of sheet in each pixel, from rays (rows * n, columns * n, 3)."""
     sheet, origin = _sheet(target)
-    x, y, depth = np.moveaxis(rays @ pose.rotation.astype(np.float32), -1, 0)
-    place = (pose.rotation.T @ pose.translation_mm).astype(np.float32)
+    x, y, depth = np.moveaxis(rays @ pose.rotation, -1, 0)
+    place = pose.rotation.T @ pose.translation_mm
     scale = np.divide(place[2], depth, out=np.full_like(depth, -1), where=depth * place[2] > 0)
     where = [
         ((axis * scale - start) * _SHEET_PX_PER_MM + middle).clip(-9, 32000).astype(np.float32)
         for axis, start, middle in zip((x, y), place, origin, strict=False)
     ]
     print_ = cv2.remap(sheet, *where, cv2.INTER_LINEAR, borderValue=_NO_SHEET)
-    covered = (print_ > _NO_SHEET / 2) & (scale > 0)
+    covered = (print_ > _NO_SHEET / 2) & (scale > 0) & seen
     size = (x.shape[1] // _SUBPIXELS, x.shape[0] // _SUBPIXELS)
     return tuple(
         cv2.resize(share.astype(np.float32), size, interpolation=cv2.INTER_AREA)
@@ -155,17 +156,11 @@ def _sheet_seen(rays: np.ndarray, target: Target, pose: Pose) -> tuple[np.ndarra
     )
 
 
-@lru_cache(maxsize=2)
-def _rays(lens: Lens) -> tuple[np.ndarray, np.ndarray]:
-    """Rays (height * n, width * n, 3) float32 of every subpixel, and the lit share of pixels."""
-    y, x = (
-        (np.arange(size * _SUBPIXELS) + 0.5) / _SUBPIXELS - 0.5
-        for size in (lens.height, lens.width)
-    )
-    rays, seen = lens.unproject(np.stack(np.meshgrid(x, y), axis=-1))
-    lit = cv2.resize(seen.astype(np.float32), (lens.width, lens.height),
-                     interpolation=cv2.INTER_AREA)
-    return rays.astype(np.float32), lit
+@lru_cache(maxsize=4)
+def _lit(lens: Lens) -> np.ndarray:
+    """Mark the pixels (height, width) that the lens lights, 1 or 0."""
+    return lens.unproject(np.stack(np.meshgrid(np.arange(lens.width), np.arange(lens.height)),
+                                   axis=-1))[1].astype(float)
 
 
 @lru_cache(maxsize=4)
