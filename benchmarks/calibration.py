@@ -54,8 +54,13 @@ def fisheye(fov_deg: int, width: int) -> FisheyeLens:
     focal, distortion = LENSES[fov_deg]
     scale = width / 640
     return FisheyeLens(
-        width, width * 3 // 4, focal * scale, focal * scale * 1.003,
-        321.8 * scale, 237.6 * scale, distortion,
+        width,
+        width * 3 // 4,
+        focal * scale,
+        focal * scale * 1.003,
+        321.8 * scale,
+        237.6 * scale,
+        distortion,
     )
 
 
@@ -69,8 +74,10 @@ def angle_error_deg(lens: FisheyeLens, truth: FisheyeLens, reach_rad: float) -> 
     """Largest error of the distortion curve out to an angle."""
     angles = np.linspace(0.01, reach_rad, 200)
     rays = np.stack([np.sin(angles), 0 * angles, np.cos(angles)], axis=-1)
-    pixels = truth.project(rays)[0] + (lens.center_x_px - truth.center_x_px,
-                                       lens.center_y_px - truth.center_y_px)
+    pixels = truth.project(rays)[0] + (
+        lens.center_x_px - truth.center_x_px,
+        lens.center_y_px - truth.center_y_px,
+    )
     back = lens.unproject(pixels)[0]
     return float(np.degrees(np.abs(np.arctan2(back[:, 0], back[:, 2]) - angles).max()))
 
@@ -87,8 +94,9 @@ def measure(truth: FisheyeLens, target: Target, pictures, *, correct_bias=True) 
     lens, reach = calibration.lens, calibration.directions_rad[0].max()
     return Result(
         focal_percent=100 * abs(lens.focal_x_px / truth.focal_x_px - 1),
-        center_px=float(np.hypot(lens.center_x_px - truth.center_x_px,
-                                 lens.center_y_px - truth.center_y_px)),
+        center_px=float(
+            np.hypot(lens.center_x_px - truth.center_x_px, lens.center_y_px - truth.center_y_px)
+        ),
         angle_deg=angle_error_deg(lens, truth, reach),
         reach_deg=float(np.degrees(reach)),
         rms_px=calibration.rms_px,
@@ -100,8 +108,10 @@ def measure(truth: FisheyeLens, target: Target, pictures, *, correct_bias=True) 
 def accuracy() -> None:
     """Print the errors of four cameras, with and without the correction of the bias."""
     print(f'{VIEWS} views each; the errors without the correction of the bias in brackets')
-    print('lens  picture    circles  focal length, %  principal point, px  '
-          'angle, degrees          rms, px')
+    print(
+        'lens  picture    circles  focal length, %  principal point, px  '
+        'angle, degrees          rms, px'
+    )
     for fov_deg in LENSES:
         for width, circles in ((640, 9), (1280, 70)):
             truth, target = fisheye(fov_deg, width), GRIDS[circles]
@@ -123,8 +133,10 @@ def against_circles() -> list[tuple[int, Result]]:
     for circles, target in GRIDS.items():
         result = measure(truth, target, photographs(truth, target))
         rows.append((circles, result))
-        print(f'{circles:7}  {1000 * result.find_s:18.0f}  {result.fit_s:6.2f}  '
-              f'{result.focal_percent:15.3f}  {result.angle_deg:14.3f}')
+        print(
+            f'{circles:7}  {1000 * result.find_s:18.0f}  {result.fit_s:6.2f}  '
+            f'{result.focal_percent:15.3f}  {result.angle_deg:14.3f}'
+        )
     return rows
 
 
@@ -151,8 +163,12 @@ def draw(circles: list[tuple[int, Result]], sizes: list[tuple[str, float]]) -> N
     left, right = figure.subplots(1, 2)
     counts = [count for count, _ in circles]
     left.plot(counts, [1000 * result.find_s for _, result in circles], 'o-')
-    left.set(xlabel='circles', ylabel='find, ms a picture (blue)', ylim=(0, None),
-             title=f'1280x960, {VIEWS} views')
+    left.set(
+        xlabel='circles',
+        ylabel='find, ms a picture (blue)',
+        ylim=(0, None),
+        title=f'1280x960, {VIEWS} views',
+    )
     error = left.twinx()
     error.plot(counts, [result.angle_deg for _, result in circles], 's--', color='C1')
     error.set(ylabel='angle error, degrees (orange)', ylim=(0, None))

@@ -37,7 +37,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _parser() -> _Parser:
     parser = _Parser(
-        prog='calibrate_lens', description=__doc__,
+        prog='calibrate_lens',
+        description=__doc__,
         epilog='Exit code: 0 good, 2 poor but written, 1 nothing written.',
     )
     add = parser.add_argument
@@ -53,8 +54,12 @@ def _parser() -> _Parser:
     add('--dy-mm', type=float, help='distance of rows (default: as --dx-mm, if that is given)')
     add('--radius-mm', type=float, help='of the circles')
     add('--marker-mm', type=float, help="side of a ChArUco board's markers")
-    add('--min-area-px', type=float, default=0.0,
-        help='smallest circle (default: 100 at 640x480, scaled with the picture)')
+    add(
+        '--min-area-px',
+        type=float,
+        default=0.0,
+        help='smallest circle (default: 100 at 640x480, scaled with the picture)',
+    )
     add('--max-area-px', type=float, default=0.0, help='largest circle (default: likewise 10000)')
     add('--name', default='camera', help='camera_name in the file (default: %(default)s)')
     add('-o', '--output', type=Path, help='camera_info file to write (default: NAME.yaml)')
@@ -79,8 +84,10 @@ def _run(options: argparse.Namespace) -> int:
         return GOOD
     collector = Collector(Detector(target, options.min_area_px, options.max_area_px))
     if options.topic:
-        from fisheye_undistort.collect_node import collect
-
+        try:
+            from fisheye_undistort.collect_node import collect
+        except ImportError as error:
+            raise SettingError(f'--topic needs ROS 2: {error}') from error
         collect(options.topic, collector, options.views, options.half)
     elif options.pictures:
         for picture in read_pictures(options.pictures, options.half):
@@ -89,14 +96,13 @@ def _run(options: argparse.Namespace) -> int:
         raise SettingError('nothing to do: give pictures, --topic or --print (see --help)')
     calibration = calibrate(collector.finish(), target, collector.size)
     report = Report(calibration, collector.brightest, collector.skipped)
-    output = options.output or Path(f'{options.name}.yaml')
-    write_camera(output, Camera(options.name, calibration.lens))
-    print(report)
-    print(f'written  {output}')
     if options.plot:
         from fisheye_undistort.report_plot import plot_report
 
         plot_report(options.plot, report, collector.example)
+    output = options.output or Path(f'{options.name}.yaml')
+    write_camera(output, Camera(options.name, calibration.lens))
+    print(f'{report}\nwritten  {output}')
     return GOOD if report.good else POOR
 
 

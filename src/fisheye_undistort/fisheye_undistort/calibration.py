@@ -14,7 +14,14 @@ from fisheye_undistort.sheet_model import UNKNOWNS, bend, lens_of, to_camera
 from fisheye_undistort.target import Target
 
 _ORDER = (
-    'focal length', 'k1', 'principal point', 'k2', 'aspect ratio', 'k3', 'k4', 'bulge',
+    'focal length',
+    'k1',
+    'principal point',
+    'k2',
+    'aspect ratio',
+    'k3',
+    'k4',
+    'bulge',
 )
 MODELS = tuple(_ORDER[:count] for count in range(1, len(_ORDER) + 1))
 """What is fitted, from what every picture tells to what only many can."""
@@ -71,10 +78,12 @@ class Calibration:
     def directions_rad(self) -> tuple[np.ndarray, np.ndarray]:
         """Angle from the axis and about it of the target's points, all views in one array."""
         points = bend(self.target.points_mm, self.estimate.bulge_mm)
-        x, y, z = np.concatenate([
-            to_camera(pose, points[view.ids])
-            for pose, view in zip(self.estimate.poses, self.views, strict=True)
-        ]).T
+        x, y, z = np.concatenate(
+            [
+                to_camera(pose, points[view.ids])
+                for pose, view in zip(self.estimate.poses, self.views, strict=True)
+            ]
+        ).T
         return np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)
 
 
@@ -109,8 +118,10 @@ def calibrate(
         if not misfits.any():
             break
         rms = ladder[-1].rms_px[misfits]
-        dropped |= {view.name: f'does not fit: rms {miss:.2f} px' for view, miss in
-                    zip(compress(fitter.views, misfits), rms, strict=True)}
+        dropped |= {
+            view.name: f'does not fit: rms {miss:.2f} px'
+            for view, miss in zip(compress(fitter.views, misfits), rms, strict=True)
+        }
         fitter = _Fitter([*compress(fitter.views, ~misfits)], target, size, correct_bias)
     estimate = fitter.choose(ladder)
     lens = lens_of(estimate.unknowns, size)
@@ -130,8 +141,9 @@ class _Fitter:
         self._models = [free for free in MODELS if _unknowns(free) <= affordable] or MODELS[:1]
 
     def _fit(self, estimate: Estimate, free, bias, **how) -> Estimate:
-        return fit(self.views, self._target.points_mm, estimate, self._start.unknowns, free,
-                   bias, **how)
+        return fit(
+            self.views, self._target.points_mm, estimate, self._start.unknowns, free, bias, **how
+        )
 
     def climb(self) -> list[Estimate]:
         """Fit each model roughly, the next from where the last one ended."""

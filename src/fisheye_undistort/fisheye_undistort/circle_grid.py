@@ -136,8 +136,10 @@ def _particles(dark: np.ndarray, low: float, high: float):
         # 1 for every ellipse, less for whatever is less compact.
         roundness = area[label] / (4 * np.pi * np.sqrt(small * large))
         if roundness >= _MIN_ROUNDNESS:
-            yield np.array([x + moments['m10'] / area[label],
-                            y + moments['m01'] / area[label]]), shape
+            yield (
+                np.array([x + moments['m10'] / area[label], y + moments['m01'] / area[label]]),
+                shape,
+            )
 
 
 def _first_of_each(centers: np.ndarray, shapes: np.ndarray) -> np.ndarray:

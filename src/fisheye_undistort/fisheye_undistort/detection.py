@@ -56,8 +56,10 @@ class Detector:
 
 def _chessboard(gray: np.ndarray, target: Target):
     found, corners = cv2.findChessboardCorners(
-        gray, (target.columns, target.rows),
-        flags=cv2.CALIB_CB_ADAPTIVE_THRESH + cv2.CALIB_CB_NORMALIZE_IMAGE
+        gray,
+        (target.columns, target.rows),
+        flags=cv2.CALIB_CB_ADAPTIVE_THRESH
+        + cv2.CALIB_CB_NORMALIZE_IMAGE
         + cv2.CALIB_CB_FAST_CHECK,
     )
     if not found:
@@ -82,9 +84,7 @@ def _charuco(gray: np.ndarray, target: Target):
         markers, marker_ids, _ = cv2.aruco.detectMarkers(gray, dictionary)
         corners, ids = None, None
         if markers:
-            _, corners, ids = cv2.aruco.interpolateCornersCharuco(
-                markers, marker_ids, gray, board
-            )
+            _, corners, ids = cv2.aruco.interpolateCornersCharuco(markers, marker_ids, gray, board)
     found = 0 if ids is None else len(ids)
     if found < _MIN_CORNERS:
         raise CalibrationError(

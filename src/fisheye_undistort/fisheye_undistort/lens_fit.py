@@ -101,9 +101,15 @@ def rms(residuals_px: np.ndarray) -> float:
     return float(np.sqrt(np.mean(np.sum(residuals_px**2, axis=-1))))
 
 
-def fit(views: list[View], points_mm: np.ndarray, start: Estimate, nominal: np.ndarray,
-        free: tuple[str, ...], bias_px: list[np.ndarray] | None = None,
-        tolerance: float = 1e-8) -> Estimate:
+def fit(
+    views: list[View],
+    points_mm: np.ndarray,
+    start: Estimate,
+    nominal: np.ndarray,
+    free: tuple[str, ...],
+    bias_px: list[np.ndarray] | None = None,
+    tolerance: float = 1e-8,
+) -> Estimate:
     """Fit the free unknowns and every pose.
 
     Parameters
@@ -125,15 +131,23 @@ def fit(views: list[View], points_mm: np.ndarray, start: Estimate, nominal: np.n
     """
     problem = _Problem(views, points_mm, nominal, free, bias_px)
     solution = least_squares(
-        problem.residuals, problem.pack(start), problem.jacobian, method='lm', x_scale='jac',
-        ftol=tolerance, max_nfev=_MAX_EVALUATIONS,
+        problem.residuals,
+        problem.pack(start),
+        problem.jacobian,
+        method='lm',
+        x_scale='jac',
+        ftol=tolerance,
+        max_nfev=_MAX_EVALUATIONS,
     )
     unknowns, poses = problem.unpack(solution.x)
     misses = problem.misses_px(solution.x)
     return Estimate(
-        unknowns, poses,
+        unknowns,
+        poses,
         residuals_px=tuple(-part for part in np.split(misses, problem.splits)),
-        covariance=problem.covariance(solution), cost=2 * solution.cost, free=free,
+        covariance=problem.covariance(solution),
+        cost=2 * solution.cost,
+        free=free,
     )
 
 

@@ -76,7 +76,9 @@ def scattered_poses(
     for _ in range(_TRIES * count):
         tilt = random.uniform((-0.6, -0.6, -3), (0.6, 0.6, 3))
         pose = facing_pose(
-            random.uniform(0, 2 * np.pi), random.uniform(0, 1.4), random.uniform(*distance_mm),
+            random.uniform(0, 2 * np.pi),
+            random.uniform(0, 1.4),
+            random.uniform(*distance_mm),
             tilt,
         )
         pixels, seen = lens.project(outline @ pose.rotation.T + pose.translation_mm)
@@ -100,8 +102,10 @@ def render_view(lens: Lens, target: Target, pose: Pose, look: Look = Look(), see
     picture = lit * look.backdrop * _mottle(lit.shape, random)
     top, bottom, left, right = _window(lens, target, pose)
     if top < bottom and left < right:
-        y, x = (np.arange(*edge, 1 / _SUBPIXELS) + (1 / _SUBPIXELS - 1) / 2
-                for edge in ((top, bottom), (left, right)))
+        y, x = (
+            np.arange(*edge, 1 / _SUBPIXELS) + (1 / _SUBPIXELS - 1) / 2
+            for edge in ((top, bottom), (left, right))
+        )
         rays, seen = lens.unproject(np.stack(np.meshgrid(x, y), axis=-1))
         ink, covered = _sheet_seen(rays, seen, target, pose)
         sheet = look.ink * ink + look.paper * (covered - ink)
@@ -115,8 +119,9 @@ def render_view(lens: Lens, target: Target, pose: Pose, look: Look = Look(), see
 
 def _mottle(shape: tuple[int, int], random) -> np.ndarray:
     """Give a backdrop that is not plain, around 1."""
-    return cv2.resize(random.normal(1.0, 0.3, (12, 16)), shape[::-1],
-                      interpolation=cv2.INTER_CUBIC)
+    return cv2.resize(
+        random.normal(1.0, 0.3, (12, 16)), shape[::-1], interpolation=cv2.INTER_CUBIC
+    )
 
 
 def _window(lens: Lens, target: Target, pose: Pose) -> tuple[int, int, int, int]:
@@ -159,8 +164,9 @@ def _sheet_seen(rays, seen, target: Target, pose: Pose) -> tuple[np.ndarray, np.
 @lru_cache(maxsize=4)
 def _lit(lens: Lens) -> np.ndarray:
     """Mark the pixels (height, width) that the lens lights, 1 or 0."""
-    return lens.unproject(np.stack(np.meshgrid(np.arange(lens.width), np.arange(lens.height)),
-                                   axis=-1))[1].astype(float)
+    return lens.unproject(
+        np.stack(np.meshgrid(np.arange(lens.width), np.arange(lens.height)), axis=-1)
+    )[1].astype(float)
 
 
 @lru_cache(maxsize=4)

@@ -51,8 +51,12 @@ class Report:
         lens = self.calibration.lens
         circle = ImageCircle(lens)
         circle.look(self.brightest)
-        middle = [(-0.5, lens.center_y_px), (lens.width - 0.5, lens.center_y_px),
-                  (lens.center_x_px, -0.5), (lens.center_x_px, lens.height - 0.5)]
+        middle = [
+            (-0.5, lens.center_y_px),
+            (lens.width - 0.5, lens.center_y_px),
+            (lens.center_x_px, -0.5),
+            (lens.center_x_px, lens.height - 0.5),
+        ]
         return min(circle.angle_rad, max(lens.angle_at(x, y) for x, y in middle))
 
     @cached_property
@@ -82,26 +86,32 @@ class Report:
         outer = azimuth[angle > _HALF_WAY * self.edge_rad]
         sectors = len(np.unique(((outer / (2 * np.pi) + 1) * SECTORS + 0.5).astype(int) % SECTORS))
         if sectors < _MIN_SECTORS:
-            yield (f'points beyond {_HALF_WAY * edge:.0f} degrees in only {sectors} of '
-                   f'{SECTORS} directions')
+            yield (
+                f'points beyond {_HALF_WAY * edge:.0f} degrees in only {sectors} of '
+                f'{SECTORS} directions'
+            )
 
     def _doubts_of_fit(self):
         calibration = self.calibration
         lens, deviations = calibration.lens, calibration.deviations
         if calibration.rms_px > _MAX_RMS_WIDTHS * lens.width:
-            yield (f'the points scatter by {calibration.rms_px:.2f} px (expected at most '
-                   f'{_MAX_RMS_WIDTHS * lens.width:.1f})')
+            yield (
+                f'the points scatter by {calibration.rms_px:.2f} px (expected at most '
+                f'{_MAX_RMS_WIDTHS * lens.width:.1f})'
+            )
         focal = deviations['focal_x_px'] / lens.focal_x_px
         if focal > _MAX_FOCAL_DEVIATION:
             yield f'the focal length is uncertain by {focal:.1%}'
         center = max(deviations['center_x_px'], deviations['center_y_px'])
         if center > _MAX_CENTER_DEVIATION_WIDTHS * lens.width:
             yield f'the principal point is uncertain by {center:.1f} px'
-        fixed = [name for name in GROUPS if name not in calibration.estimate.free]
-        if 'principal point' in fixed:
-            yield 'the principal point is assumed in the middle'
-        if 'k1' in fixed:
-            yield 'the distortion is assumed to be none'
+        if len(calibration.views) < _MIN_VIEWS and self._assumed:
+            yield f'{", ".join(self._assumed)} could only be assumed'
+
+    @property
+    def _assumed(self) -> list[str]:
+        """Groups of unknowns that were not fitted."""
+        return [name for name in GROUPS if name not in self.calibration.estimate.free]
 
     @property
     def good(self) -> bool:
@@ -113,14 +123,21 @@ class Report:
         """One sentence."""
         if self.good:
             reach = np.degrees(self.calibration.directions_rad[0].max())
-            return (f'good: {len(self.calibration.views)} views out to {reach:.0f} degrees fit '
-                    f'to {self.calibration.rms_px:.2f} px')
+            return (
+                f'good: {len(self.calibration.views)} views out to {reach:.0f} degrees fit '
+                f'to {self.calibration.rms_px:.2f} px'
+            )
         return f'poor: {"; ".join(self.doubts)}'
 
     def __str__(self):
-        return '\n'.join([
-            *self._views(), *self._lens(), *self._covered(), f'verdict  {self.verdict}',
-        ])
+        return '\n'.join(
+            [
+                *self._views(),
+                *self._lens(),
+                *self._covered(),
+                f'verdict  {self.verdict}',
+            ]
+        )
 
     def _views(self):
         calibration = self.calibration
@@ -137,10 +154,9 @@ class Report:
         calibration = self.calibration
         unknowns, deviations = calibration.estimate.unknowns, calibration.deviations
         yield f'lens     Kannala-Brandt, {calibration.lens.width} x {calibration.lens.height} px'
-        fixed = [name for name in GROUPS if name not in calibration.estimate.free]
         yield f'fitted   {", ".join(calibration.estimate.free)}'
-        if fixed:
-            yield f'assumed  {", ".join(fixed)}: the data do not speak for more'
+        if self._assumed:
+            yield f'assumed  {", ".join(self._assumed)}: the points do not ask for more'
         for (name, deviation), value in zip(deviations.items(), unknowns, strict=True):
             digits = 3 if name not in INTRINSICS or name.endswith('px') else 6
             known = f'+- {deviation:.{digits}f}' if deviation else 'assumed'

@@ -1,6 +1,7 @@
 """Draw what a calibration is worth."""
 
 from pathlib import Path
+from textwrap import fill
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -12,6 +13,8 @@ from fisheye_undistort.calibration import Calibration
 from fisheye_undistort.report import Report
 
 _SIZE_INCH = (16, 9.5)
+_TITLE = 150
+"""Characters in a line of it."""
 _ARROW_WIDTHS = 0.03
 """Length of the longest residual as drawn, in widths of the picture."""
 _STRAIGHT_FOV_RAD = np.radians(120)
@@ -35,7 +38,7 @@ def plot_report(path: str | Path, report: Report, example: np.ndarray) -> None:
         If the file cannot be written.
     """
     figure = Figure(figsize=_SIZE_INCH, layout='constrained')
-    figure.suptitle(report.verdict[:150], fontsize=13)
+    figure.suptitle(fill(report.verdict, _TITLE), fontsize=13)
     grid = figure.add_gridspec(2, 3)
     calibration = report.calibration
     _points(figure.add_subplot(grid[0, 0]), calibration, report.brightest)
@@ -64,13 +67,23 @@ def _residuals(axes, calibration: Calibration) -> None:
     width, height = calibration.lens.width, calibration.lens.height
     enlarged = _ARROW_WIDTHS * width / max(length.max(), 1e-9)
     axes.quiver(
-        *points.T, *residuals.T, length, angles='xy', scale_units='xy', scale=1 / enlarged,
-        width=0.003, cmap='viridis',
+        *points.T,
+        *residuals.T,
+        length,
+        angles='xy',
+        scale_units='xy',
+        scale=1 / enlarged,
+        width=0.003,
+        cmap='viridis',
     )
     axes.plot(calibration.lens.center_x_px, calibration.lens.center_y_px, 'r+', ms=12)
     axes.set(
         title=f'residuals, {enlarged:.0f} times enlarged; the longest has {length.max():.2f} px',
-        xlim=(0, width), ylim=(height, 0), aspect='equal', xlabel='x, px', ylabel='y, px',
+        xlim=(0, width),
+        ylim=(height, 0),
+        aspect='equal',
+        xlabel='x, px',
+        ylabel='y, px',
     )
 
 

@@ -14,7 +14,11 @@ from fisheye_undistort.target import MARKERS, Target
 FORMATS = ('.pdf', '.svg', '.png')
 
 _PAPERS_MM = {
-    'A4': (210, 297), 'A3': (297, 420), 'A2': (420, 594), 'A1': (594, 841), 'A0': (841, 1189),
+    'A4': (210, 297),
+    'A3': (297, 420),
+    'A2': (420, 594),
+    'A1': (594, 841),
+    'A0': (841, 1189),
 }
 _MARGIN_MM = 8.0
 """What printers leave white, and what a pattern needs around it."""
@@ -36,8 +40,10 @@ def write_sheet(path: str | Path, target: Target) -> str:
     """
     path = Path(path)
     if path.suffix.lower() not in FORMATS:
-        raise SettingError(f"a sheet '{path.name}' cannot be written; "
-                           f'expected a name that ends in {", ".join(FORMATS)}')
+        raise SettingError(
+            f"a sheet '{path.name}' cannot be written; "
+            f'expected a name that ends in {", ".join(FORMATS)}'
+        )
     paper, size_mm = paper_for(target)
     try:
         _draw(target, paper, size_mm).savefig(path, dpi=300)

@@ -21,8 +21,13 @@ def fisheye(fov_deg: int, scale: int = 1) -> FisheyeLens:
         190: (199.0, (-0.03, 0.003, -0.006, 0.0015)),
     }[fov_deg]
     return FisheyeLens(
-        640 * scale, 480 * scale, focal * scale, focal * scale * 1.003,
-        321.8 * scale, 237.6 * scale, distortion,
+        640 * scale,
+        480 * scale,
+        focal * scale,
+        focal * scale * 1.003,
+        321.8 * scale,
+        237.6 * scale,
+        distortion,
     )
 
 

@@ -1,3 +1,5 @@
+import sys
+
 import cv2
 import numpy as np
 import pytest
@@ -116,3 +118,16 @@ def test_bad_arguments_are_a_sentence_too(arguments, told, capsys):
 def test_the_file_cannot_be_written(shots, capsys):
     told = refused(capsys, shots / 'shot01.png', '-o', '/proc/nowhere/camera.yaml')
     assert '/proc/nowhere/camera.yaml cannot be written' in told
+
+
+def test_without_ros_only_the_topic_is_refused(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, 'fisheye_undistort.collect_node', None)
+    assert '--topic needs ROS 2' in refused(capsys, '--topic', '/left/image_raw')
+
+
+def test_where_the_plot_cannot_be_drawn_nothing_is_written(shots, tmp_path, capsys):
+    output = tmp_path / 'camera.yaml'
+    plot = tmp_path / 'nowhere' / 'plot.png'
+    told = refused(capsys, shots / 'shot01.png', '-o', output, '--plot', plot)
+    assert 'the plot' in told
+    assert not output.exists()

@@ -100,8 +100,12 @@ def test_a_board_that_is_not_flat_does_not_bend_the_lens(paper_lens):
     points = bend(BOARD.points_mm, bulge)
     random = np.random.default_rng(0)
     views = [
-        View('', paper_lens.project(points @ pose.rotation.T + pose.translation_mm)[0]
-             + random.normal(0, 0.05, (70, 2)), np.arange(70))
+        View(
+            '',
+            paper_lens.project(points @ pose.rotation.T + pose.translation_mm)[0]
+            + random.normal(0, 0.05, (70, 2)),
+            np.arange(70),
+        )
         for pose in scattered_poses(paper_lens, BOARD, 12, (120, 220), seed=2)
     ]
     calibration = calibrate(views, BOARD, SIZE)
@@ -126,10 +130,18 @@ def test_what_does_not_help_is_not_fitted():
 
 
 def test_the_bias_is_that_of_a_photograph(paper_lens, paper_poses, paper_pictures):
-    unknowns = np.array([
-        paper_lens.focal_x_px, paper_lens.focal_y_px, paper_lens.center_x_px,
-        paper_lens.center_y_px, *paper_lens.distortion, 0, 0, 0,
-    ])
+    unknowns = np.array(
+        [
+            paper_lens.focal_x_px,
+            paper_lens.focal_y_px,
+            paper_lens.center_x_px,
+            paper_lens.center_y_px,
+            *paper_lens.distortion,
+            0,
+            0,
+            0,
+        ]
+    )
     found_px = 0.05
     """What blur and noise leave of a centre of mass."""
     for pose, picture in zip(paper_poses[:4], paper_pictures, strict=False):

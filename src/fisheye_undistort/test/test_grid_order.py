@@ -39,9 +39,7 @@ def images_of(lens, target, pose):
 
 def same_order(points, ids, truth):
     """Tell whether ids are right; symmetric grids may be turned by half a turn."""
-    return any(
-        np.abs(points - order[ids]).max() < NEAR_PX for order in (truth, truth[::-1])
-    )
+    return any(np.abs(points - order[ids]).max() < NEAR_PX for order in (truth, truth[::-1]))
 
 
 @pytest.mark.parametrize('fov_deg', [170, 190])

@@ -39,8 +39,15 @@ def test_many_views_all_over_are_good(good):
 
 def test_everything_is_told(good):
     text = str(good)
-    for told in ('shot3.png', 'blank.png', 'not used: no chessboard', 'focal_x_px', '+-',
-                 '10-20 deg', 'verdict  good'):
+    for told in (
+        'shot3.png',
+        'blank.png',
+        'not used: no chessboard',
+        'focal_x_px',
+        '+-',
+        '10-20 deg',
+        'verdict  good',
+    ):
         assert told in text
 
 
@@ -53,14 +60,22 @@ def test_coverage_counts_every_point(good):
     ('poses', 'noise_px', 'doubt'),
     [
         ([facing_pose(0, 0.1, 150, (0.4, 0.2, 0))], 0.05, 'only 1 view '),
-        ([facing_pose(a, 0.2, 250, (0.4, 0.2, a)) for a in range(6)], 0.05,
-         'degrees, and the picture shows 8'),
-        ([facing_pose(a / 9, 0.6, 120, (0.3, 0.2, a)) for a in range(6)], 0.05,
-         'of 8 directions'),
-        ([facing_pose(a, 0.6, 120, (0.3, 0.2, a)) for a in range(6)], 1.5,
-         'the points scatter by'),
-        ([facing_pose(a, 0.1, 500, (0.1, 0, a)) for a in range(6)], 0.5,
-         'focal length is uncertain'),
+        (
+            [facing_pose(a, 0.2, 250, (0.4, 0.2, a)) for a in range(6)],
+            0.05,
+            'degrees, and the picture shows 8',
+        ),
+        ([facing_pose(a / 9, 0.6, 120, (0.3, 0.2, a)) for a in range(6)], 0.05, 'of 8 directions'),
+        (
+            [facing_pose(a, 0.6, 120, (0.3, 0.2, a)) for a in range(6)],
+            1.5,
+            'the points scatter by',
+        ),
+        (
+            [facing_pose(a, 0.1, 500, (0.1, 0, a)) for a in range(6)],
+            0.5,
+            'focal length is uncertain',
+        ),
     ],
 )
 def test_what_is_doubtful_is_named(poses, noise_px, doubt, paper_lens):
