@@ -108,8 +108,8 @@ def _draw(target: Target, paper: str, size_mm: tuple[float, float]) -> Figure:
         axes.add_patch(shape)
     edge = left + _MARGIN_MM
     _ruler(axes, edge)
-    text = f'{target}. Paper {paper}: print at 100 % ("actual size") and check the ruler.'
-    axes.text(edge + 6, 0, text, rotation=90, ha='left', va='center', fontsize=8)
+    text = f'{target}\n{paper}: print at 100 % ("actual size") and check the ruler'
+    axes.text(edge + 5.5, 0, text, rotation=90, ha='left', va='center', fontsize=8)
     return figure
 
 
