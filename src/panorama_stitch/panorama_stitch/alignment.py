@@ -15,34 +15,42 @@ from panorama_stitch.pose import Pose
 from panorama_stitch.structure import Facing
 from panorama_stitch.tiles import Tiles
 
-_FEWEST_TILES = 3
-_STEEPEST_RAD = radians(6.0)
+_SEARCH_RAD, _FINE_RAD = radians(3.2), radians(0.8)
+"""How far from where it is expected each tile of the overlap is looked for."""
+_STEEPEST_RAD = radians(4.0)
 """No mount is that far off: it would be a false match."""
 _STRIDE = 2
 """Every second pixel is enough to correlate two smooth pictures."""
 
 
-def align(facing: Facing, start: Pose, search_deg: float, tilt: bool) -> Pose:
-    """Refine a pose; the one that was given where the overlap does not tell a better one.
+def align(facing: Facing, start: Pose, tilt: bool) -> Pose:
+    """Find the pose around an offset of a level rig.
+
+    The start stays where the overlap tells nothing better.
 
     Parameters
     ----------
     facing
-        The pictures.
+        The structures.
     start
-        The pose to refine, px of these pictures.
-    search_deg
-        How far from where it is expected each tile of the overlap is looked for.
+        Where to begin, px of these pictures.
     tilt
         Whether the right camera may be turned.
     """
-    search_rad = radians(search_deg)
-    tiles = Tiles(facing, start, search_rad, tilt)
-    if len(tiles) < _FEWEST_TILES:
-        return start
-    pose = start.moved(tiles.climb(tiles.search()))
-    shift = max(abs(pose.x_px - start.x_px), abs(pose.y_px - start.y_px))
-    too_far = shift > search_rad * facing.surface.focal_px
+    tiles = Tiles(facing, start, _SEARCH_RAD, tilt)
+    return _checked(facing, start, tiles.climb(tiles.search()), _SEARCH_RAD) if len(tiles) else start
+
+
+def refine(facing: Facing, start: Pose, tilt: bool) -> Pose:
+    """Improve a pose that is nearly right already; parameters as of `align`."""
+    tiles = Tiles(facing, start, _FINE_RAD, tilt)
+    return _checked(facing, start, tiles.climb(np.zeros(4)), _FINE_RAD) if len(tiles) else start
+
+
+def _checked(facing, start, step, search_rad) -> Pose:
+    """Take a step from the start if it is one that a rig can need."""
+    pose = start.moved(step)
+    too_far = max(abs(step[:2])) > search_rad * facing.surface.focal_px
     too_steep = max(abs(pose.pitch_rad), abs(pose.roll_rad)) > _STEEPEST_RAD
     return start if too_far or too_steep else pose
 
@@ -64,5 +72,4 @@ def certainty(facing: Facing, pose: Pose) -> float:
     theirs, mine = theirs[seen > 0], right.image[part][seen > 0]
     energy = float(np.sqrt((mine @ mine) * (theirs @ theirs)))
     correlation = float(mine @ theirs) / max(energy, 1.0)
-    area = _STRIDE * _STRIDE
-    return max(0.0, float(less_chance(correlation, energy * area, mine.size * area)))
+    return max(0.0, float(less_chance(correlation, energy * _STRIDE**2)))

@@ -53,8 +53,9 @@ class Landscape:
         """Give the offset (x, y) with the highest score around one."""
         rows, columns = (
             np.flatnonzero(np.abs(axis - np.clip(at, axis[0], axis[-1])) <= within_px)
-            for axis, at in ((self.y, y), (self.x, x))
+            for axis, at in ((self.y[1:-1], y), (self.x, x))
         )
+        rows += 1
         part = self.score[np.ix_(rows, columns)]
         row, column = np.unravel_index(np.argmax(part), part.shape)
         return int(self.x[columns[column]]), int(self.y[rows[row]])
@@ -72,20 +73,8 @@ class Landscape:
         return max(0.0, float(columns.max())), float(self.x[away[np.argmax(columns)]])
 
 
-def correlate(
-    facing: Facing, x: Sequence[int], y: Sequence[int], min_pixels: float
-) -> Landscape:
-    """Correlate two structures at the offsets `x`, `y`.
-
-    Parameters
-    ----------
-    facing
-        The structures.
-    x, y
-        Consecutive offsets, px of the structures.
-    min_pixels
-        Offsets at which they share fewer score -1.
-    """
+def correlate(facing: Facing, x: Sequence[int], y: Sequence[int]) -> Landscape:
+    """Correlate two structures at the offsets `x`, `y`: consecutive numbers, px of the structures."""
     rows, columns = np.asarray(y), np.asarray(x)
     shape = tuple(
         cv2.getOptimalDFTSize(max(a, b) + int(np.abs(offsets).max()))
@@ -98,22 +87,20 @@ def correlate(
         [_spectrum(image, shape) for image in (one.image, one.image * one.image, one.valid)]
         for one in (facing.left, facing.right)
     )
-    both, left_energy, right_energy, pixels = (
+    both, left_energy, right_energy = (
         cv2.dft(cv2.mulSpectrums(a, b, 0, conjB=True), flags=cv2.DFT_INVERSE | cv2.DFT_SCALE)[spot]
-        for a, b in (
-            (left, right), (left_square, right_seen), (left_seen, right_square),
-            (left_seen, right_seen),
-        )
+        for a, b in ((left, right), (left_square, right_seen), (left_seen, right_square))
     )
     energy = np.sqrt(np.maximum(left_energy, 0) * np.maximum(right_energy, 0))
-    score = less_chance(both / np.maximum(energy, 1.0), energy, pixels)
-    return Landscape(columns, rows, np.where(pixels >= min_pixels, score, np.float32(-1)))
+    return Landscape(columns, rows, less_chance(both / np.maximum(energy, 1.0), energy))
 
 
-def less_chance(correlation, energy, pixels):
-    """Lower a correlation by what chance may give so few pixels, or so little structure."""
-    # Flat areas say nothing: they do not count as evidence.
-    return correlation - _DOUBT / np.sqrt(np.maximum(np.minimum(energy, pixels), 1.0))
+def less_chance(correlation, energy):
+    """Lower a correlation by what chance may give to so little structure.
+
+    The variance of a structure is about 1 where there is any, so that its energy counts pixels.
+    """
+    return correlation - _DOUBT / np.sqrt(np.maximum(energy, 1.0))
 
 
 def _spectrum(image, shape):

@@ -262,8 +262,12 @@ class _Measurement:
         )
         if found.proposals is None:
             return overlap
-        left, right = found.proposals.left, found.proposals.right
-        n, m = found.proposals.match_at(found.pose.x_px, y)
+        n, m = found.match
+        left, right = (
+            tuple(Particle(*row) for row in properties.tolist())
+            for properties in (found.proposals.left, found.proposals.right)
+        )
+        matched = paper.mean_differences(left[n : n + 1], right[m : m + 1]) if n >= 0 else [[nan]]
         return replace(
             overlap,
             method='particles',
@@ -271,10 +275,7 @@ class _Measurement:
             right_particles=right,
             left_match=n,
             right_match=m,
-            min_correlation_value=(
-                float(paper.mean_differences(left[n : n + 1], right[m : m + 1])[0, 0])
-                if n >= 0 else nan
-            ),
+            min_correlation_value=float(matched[0][0]),
         )
 
     def _not_found(self, method, found) -> Overlap:

@@ -5,7 +5,7 @@ real scenes the particles that are most alike are seldom the same thing.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 
@@ -39,7 +39,10 @@ def paper_particles(
 
 def mean_differences(left: Sequence[Particle], right: Sequence[Particle]) -> np.ndarray:
     """Mean absolute difference of the ten properties, (len(left), len(right)) float64."""
-    left, right = (np.array([np.asarray(p) for p in ps]).reshape(-1, 10) for ps in (left, right))
+    left, right = (
+        np.array([astuple(particle) for particle in particles]).reshape(-1, 10)
+        for particles in (left, right)
+    )
     return np.abs(left[:, None] - right[None]).mean(axis=2)
 
 

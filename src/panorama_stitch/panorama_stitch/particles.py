@@ -5,10 +5,13 @@ camera-based surveillance vision system", Multimedia Tools and Applications, 201
 10.1007/s11042-019-7501-z.
 """
 
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
+
+_FEW_PIXELS = 4 * 65535
+"""So many pixels hold no more particles than 16 bits can tell apart, which is faster."""
 
 
 @dataclass(frozen=True)
@@ -29,10 +32,6 @@ class Particle:
     bottom: float
     area: float
     area_percent: float
-
-    def __array__(self, dtype=None, copy=None) -> np.ndarray:
-        """Give the properties in order."""
-        return np.array(astuple(self), dtype or float)
 
 
 def facing_halves(left: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -93,43 +92,48 @@ def remove_small(binary: np.ndarray, erosions: int = 9) -> np.ndarray:
     return kept[labels]
 
 
-def analyse(
-    binary: np.ndarray, scale: float = 1.0, *, smallest_px: int = 1, most: int | None = None
-) -> tuple[Particle, ...]:
-    """Measure the ten properties of every particle (8-connected area of ones).
+def analyse(binary: np.ndarray) -> tuple[Particle, ...]:
+    """Measure every particle (8-connected area of ones) of a binary picture (height, width)."""
+    return tuple(Particle(*row) for row in measure(binary).tolist())
+
+
+def measure(binary: np.ndarray, most: int | None = None) -> np.ndarray:
+    """Measure the properties of the particles of a binary picture.
 
     Parameters
     ----------
     binary
         (height, width) uint8, 0 or 1.
-    scale
-        Size of its pixels, in those of the picture that the properties are meant for.
-    smallest_px
-        Area below which a particle is left out, px of `binary`.
     most
-        How many to give at most, the largest; None: all.
+        How many to measure at most, the largest; None: all.
 
     Returns
     -------
-    tuple of Particle
-        From top to bottom; where `most` was given, by size.
+    ndarray
+        (n, 10) float64, the fields of `Particle`; by size where `most` was given.
     """
-    _, labels, stats, centers = cv2.connectedComponentsWithStats(binary, connectivity=8)
-    areas = stats[1:, cv2.CC_STAT_AREA]
-    chosen = np.flatnonzero(areas >= smallest_px) + 1
+    few = binary.size < _FEW_PIXELS
+    count, labels, stats, centers = cv2.connectedComponentsWithStats(
+        binary, connectivity=8, ltype=cv2.CV_16U if few else cv2.CV_32S
+    )
+    chosen = np.arange(1, count)
     if most is not None:
-        chosen = chosen[np.argsort(-areas[chosen - 1], kind='stable')[:most]]
-    percent = 100.0 / max(binary.size, 1)
-    particles = []
-    for label in chosen:
-        left, top, width, height, area = map(int, stats[label])
-        first = left + int(np.argmax(labels[top, left : left + width] == label))
-        center_x, center_y = (float(center + 0.5) * scale - 0.5 for center in centers[label])
-        lengths = (first, top, left, top, left + width, top + height)
-        particles.append(
-            Particle(
-                center_x, center_y, *(float(length * scale) for length in lengths),
-                float(area * scale * scale), area * percent,
-            )
-        )
-    return tuple(particles)
+        by_size = np.argsort(-stats[chosen, cv2.CC_STAT_AREA], kind='stable')
+        chosen = chosen[by_size[:most]]
+    flat = labels.ravel()
+    inside = np.flatnonzero(binary)[::-1]
+    first = np.zeros(count, int)
+    first[flat[inside]] = inside  # the last one written is the first one seen
+    first_y, first_x = np.divmod(first[chosen], binary.shape[1])
+    left, top, width, height, area = stats[chosen].T
+    return np.column_stack([
+        centers[chosen], first_x, first_y, left, top, left + width, top + height, area,
+        100.0 * area / max(binary.size, 1),
+    ])
+
+
+def scaled(properties: np.ndarray, scale: float) -> np.ndarray:
+    """Give properties (n, 10) in px of a picture `scale` times as large."""
+    properties = properties * np.array([*[scale] * 8, scale * scale, 1.0])
+    properties[:, :2] += (scale - 1) / 2  # integers are pixel centres
+    return properties

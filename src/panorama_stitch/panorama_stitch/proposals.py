@@ -11,13 +11,14 @@ import cv2
 import numpy as np
 
 from panorama_stitch.correlation import Landscape
-from panorama_stitch.particles import Particle, analyse
+from panorama_stitch.particles import measure, open_binary, scaled
 from panorama_stitch.structure import Facing
 
 _LEVELS = (0.6, 1.2)
 """Thresholds of the structure, for bright particles; dark ones lie below their negatives."""
-_SMALLEST_PX = 4
-_MOST = 60
+_AREA = 8
+"""Column of the area."""
+_MOST = 40
 """Particles a threshold, the largest ones."""
 _UNLIKE = 0.8
 """Pairs whose area, width and height differ by more in their logarithms are not tried."""
@@ -28,22 +29,22 @@ _CLUSTER_PX = 5
 
 @dataclass(frozen=True)
 class Proposals:
-    """Particles of two facing halves, and which of them may be the same thing.
+    """Particles of two structures, and which of them may be the same thing; all in their px.
 
     Attributes
     ----------
     left, right
-        Particles, px of the unreduced halves.
+        (n, 10), (m, 10) properties of particles.
     pairs
         (n, 2) int: indices into both.
     shifts
-        (n, 2) from the right one's centre to the left one's, px of the structures.
+        (n, 2) from the right one's centre to the left one's.
     likeness
         (n,) 0 to 1.
     """
 
-    left: tuple[Particle, ...]
-    right: tuple[Particle, ...]
+    left: np.ndarray
+    right: np.ndarray
     pairs: np.ndarray
     shifts: np.ndarray
     likeness: np.ndarray
@@ -64,53 +65,45 @@ class Proposals:
         fits = np.flatnonzero(miss <= _CLUSTER_PX / 2)
         if not len(fits):
             return -1, -1
-        area = np.array([self.left[n].area for n in self.pairs[fits, 0]])
+        area = self.left[self.pairs[fits, 0], _AREA]
         best = fits[np.argmax(self.likeness[fits] * np.sqrt(area))]
         return int(self.pairs[best, 0]), int(self.pairs[best, 1])
+
+    def scaled(self, scale: float) -> 'Proposals':
+        """Give the same in px of pictures `scale` times as large."""
+        left, right = scaled(self.left, scale), scaled(self.right, scale)
+        return Proposals(left, right, self.pairs, self.shifts * scale, self.likeness)
 
 
 def propose(facing: Facing, max_rise_px: float) -> Proposals:
     """Find the particles of two structures and pair up those that may be the same thing."""
-    sides = [], []
-    pairs, likeness, first = [], [], (0, 0)
-    level_y_px = facing.level_y_px * facing.step
+    empty = np.zeros((0, 10))
+    sides = [empty], [empty]
+    pairs, likeness, before = [np.zeros((0, 2), int)], [np.zeros(0)], np.zeros(2, int)
     for level in _LEVELS:
         for sign in (1, -1):
             found = [
-                analyse(
-                    (sign * one.image > level).view(np.uint8), facing.step,
-                    smallest_px=_SMALLEST_PX, most=_MOST,
-                )
+                measure(open_binary((sign * one.image > level).view(np.uint8)), most=_MOST)
                 for one in (facing.left, facing.right)
             ]
-            indices, alike = _pair_up(*found, level_y_px, max_rise_px * facing.step)
-            pairs.append(indices + first)
+            indices, alike = _pair_up(*found, facing.level_y_px, max_rise_px)
+            pairs.append(indices + before)
             likeness.append(alike)
-            for side, particles in zip(sides, found, strict=True):
-                side.extend(particles)
-            first = tuple(map(len, sides))
-    left, right = map(tuple, sides)
-    pairs = np.concatenate(pairs)
-    centers = [
-        np.array([(p.center_x, p.center_y) for p in particles]).reshape(-1, 2)
-        for particles in sides
-    ]
-    shifts = (centers[0][pairs[:, 0]] - centers[1][pairs[:, 1]]) / facing.step
+            for side, properties in zip(sides, found, strict=True):
+                side.append(properties)
+            before += list(map(len, found))
+    (left, right), pairs = map(np.concatenate, sides), np.concatenate(pairs)
+    shifts = left[pairs[:, 0], :2] - right[pairs[:, 1], :2]
     return Proposals(left, right, pairs, shifts, np.concatenate(likeness))
 
 
 def _pair_up(left, right, level_y_px, max_rise_px):
     """Pairs (n, 2) of like particles at like heights, and how alike they are (n,)."""
-    if not (left and right):
-        return np.zeros((0, 2), int), np.zeros(0)
-    (height, shape), (other_height, other) = (
-        (
-            np.array([p.center_y for p in particles]),
-            np.log([(p.area, p.right - p.left, p.bottom - p.top) for p in particles]),
-        )
-        for particles in (left, right)
+    shape, other = (
+        np.log(np.column_stack([p[:, _AREA], p[:, 6] - p[:, 4], p[:, 7] - p[:, 5]]))
+        for p in (left, right)
     )
     difference = np.abs(shape[:, None] - other[None]).sum(axis=2)
-    rise = np.abs(height[:, None] - other_height[None] - level_y_px)
+    rise = np.abs(left[:, None, 1] - right[None, :, 1] - level_y_px)
     pairs = np.argwhere((difference <= _UNLIKE) & (rise <= max_rise_px))
     return pairs, np.exp(-_SHARPNESS * difference[tuple(pairs.T)])

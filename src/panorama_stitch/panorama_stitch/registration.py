@@ -8,17 +8,18 @@ from operator import itemgetter
 import numpy as np
 from fisheye_geometry.surface import Surface
 
-from panorama_stitch.alignment import align, certainty
+from panorama_stitch.alignment import align, certainty, refine
 from panorama_stitch.correlation import Landscape, correlate
+from panorama_stitch.particles import facing_halves
 from panorama_stitch.pose import Pose
 from panorama_stitch.proposals import Proposals, propose
-from panorama_stitch.structure import Facing, face, plain, structure
+from panorama_stitch.structure import Facing, face
 
 _SEARCH_PX_PER_DEG, _FINE_PX_PER_DEG = 2.0, 4.0
-_TILE_SEARCH_DEG, _FINE_SEARCH_DEG = 3.2, 0.8
 _APART_DEG = 3.0
 """Offsets nearer to each other are the same answer."""
 _CANDIDATES = 8
+_MOST_VERIFIED = 3
 _CLOSE = 0.15
 """An offset whose score is this much below the best one may still be the right one."""
 _DISTINCT = 1.4
@@ -63,13 +64,16 @@ class Registration:
     rival_x_px
         The second offset; None where there is none.
     proposals
-        The particles that proposed it; None where the full search did.
+        The particles that proposed it, px of the halves; None where the full search did.
+    match
+        The left and the right one of the pair that fits the pose best, -1 where none does.
     """
 
     pose: Pose
     confidence: float
     rival_x_px: float | None = None
     proposals: Proposals | None = None
+    match: tuple[int, int] = (-1, -1)
 
 
 _NOTHING = Registration(Pose(0.0, 0.0), 0.0)
@@ -97,39 +101,51 @@ def register(
     by_particles
         Whether particles propose the offsets, and the full search only where none of theirs holds.
     """
-    pair = left, right, surface_left, surface_right
-    facing = face(*pair, _SEARCH_PX_PER_DEG, structure)
-    px_per_deg = facing.surface.focal_px * radians(1)
-    landscape = _explore(facing, search, px_per_deg)
-    offsets = landscape.peaks(_CANDIDATES, round(_APART_DEG * px_per_deg))
+    left, right = facing_halves(left, right)
+    level_y_px = surface_left.center_y_px - surface_right.center_y_px
+    facing = face(left, right, surface_right, level_y_px, _SEARCH_PX_PER_DEG)
+    landscape = _explore(facing, search)
+    if landscape is None:
+        return _NOTHING
+    offsets = landscape.peaks(_CANDIDATES, round(_APART_DEG * facing.px_per_deg))
     proposals, proposed = None, []
     if by_particles:
-        proposals = propose(facing, search.max_rise_deg * px_per_deg)
+        proposals = propose(facing, search.max_rise_deg * facing.px_per_deg)
         proposed = proposals.offsets(landscape, _CANDIDATES)
-    result = _verify(facing, landscape, [*proposed, *offsets], search.tilt, px_per_deg)
-    pose = result.pose.scaled(facing.step)
-    if not any(abs(x - result.pose.x_px) <= _APART_DEG * px_per_deg for x, _ in proposed):
-        proposals = None
-    if result.confidence >= search.min_confidence:
-        fine = face(*pair, _FINE_PX_PER_DEG, plain)
-        pose = align(fine, pose.scaled(1 / fine.step), _FINE_SEARCH_DEG, search.tilt)
-        pose = pose.scaled(fine.step)
-    rival = None if result.rival_x_px is None else result.rival_x_px * facing.step
-    return replace(result, pose=pose, rival_x_px=rival, proposals=proposals)
+    best = _verify(facing, landscape, [*proposed, *offsets], search.tilt)
+    rival_x_px = None if best.rival_x_px is None else best.rival_x_px * facing.step
+    if any(abs(x - best.pose.x_px) <= _APART_DEG * facing.px_per_deg for x, _ in proposed):
+        match = proposals.match_at(best.pose.x_px, best.pose.y_px)
+        best = replace(best, proposals=proposals.scaled(facing.step), match=match)
+    pose = best.pose.scaled(facing.step)
+    if best.confidence >= search.min_confidence:
+        pose = _refine(left, right, surface_right, level_y_px, pose, search.tilt)
+    return replace(best, pose=pose, rival_x_px=rival_x_px)
 
 
-def _explore(facing: Facing, search: Search, px_per_deg: float) -> Landscape:
-    """Score all offsets that may be."""
-    narrowest = round(search.min_overlap_deg * px_per_deg)
+def _refine(left, right, surface_right, level_y_px, pose, tilt) -> Pose:
+    """Align once more at full resolution, with no more of the halves than overlaps."""
+    margin = round(_APART_DEG * surface_right.focal_px * radians(1))
+    start = max(0, round(pose.x_px) - margin)
+    left, right = left[:, start:], right[:, : left.shape[1] - round(pose.x_px) + margin]
+    facing = face(left, right, surface_right, level_y_px, _FINE_PX_PER_DEG)
+    begin = replace(pose, x_px=pose.x_px - start).scaled(1 / facing.step)
+    pose = refine(facing, begin, tilt).scaled(facing.step)
+    return replace(pose, x_px=pose.x_px + start)
+
+
+def _explore(facing: Facing, search: Search) -> Landscape | None:
+    """Score all offsets that may be; None where there are none."""
+    narrowest = round(search.min_overlap_deg * facing.px_per_deg)
     # One row more on either side tells a peak from a slope that goes on.
-    rise = round(search.max_rise_deg * px_per_deg) + 1
+    rise = round(search.max_rise_deg * facing.px_per_deg) + 1
     level = round(facing.level_y_px)
-    (height, width), right_width = facing.left.image.shape, facing.right.image.shape[1]
+    width, right_width = facing.left.image.shape[1], facing.right.image.shape[1]
     low, high = (int(np.clip(x / facing.step, -1e6, 1e6)) for x in search.x_px)
     x = range(max(narrowest - right_width, low), min(width - narrowest, high) + 1)
     if not x:
-        return Landscape(np.zeros(1, int), np.zeros(1, int), np.full((1, 1), -1.0, np.float32))
-    return correlate(facing, x, range(level - rise, level + rise + 1), narrowest * height / 4)
+        return None
+    return correlate(facing, x, range(level - rise, level + rise + 1))
 
 
 def _verify(
@@ -137,23 +153,23 @@ def _verify(
     landscape: Landscape,
     offsets: Sequence[tuple[int, int]],
     tilt: bool,
-    px_per_deg: float,
 ) -> Registration:
     """Align the promising offsets, and tell the best of them from any other."""
+    apart = _APART_DEG * facing.px_per_deg
     promising = landscape.score.max() - _CLOSE
     verified = []
-    for x, y in dict.fromkeys(offsets):
-        if landscape.score_at(x, y) >= promising and landscape.y[0] < y < landscape.y[-1]:
-            level = Pose(float(x), float(y))
-            poses = level, align(facing, level, _TILE_SEARCH_DEG, tilt)
-            tried = ((certainty(facing, pose), pose.x_px, pose) for pose in poses)
-            verified.append(max(tried, key=itemgetter(0)))
+    for x, y in offsets:
+        known = any(abs(x - one.x_px) <= apart for _, one in verified)
+        if known or len(verified) == _MOST_VERIFIED or landscape.score_at(x, y) < promising:
+            continue
+        level = Pose(float(x), float(y))
+        poses = level, align(facing, level, tilt)
+        verified.append(max(((certainty(facing, p), p) for p in poses), key=itemgetter(0)))
     if not verified:
         return _NOTHING
-    best, best_x, pose = max(verified, key=itemgetter(0))
-    apart = _APART_DEG * px_per_deg
-    rivals = [landscape.best_away_from(best_x, apart)]
-    rivals += [(sure, x) for sure, x, _ in verified if abs(x - best_x) > apart]
+    best, pose = max(verified, key=itemgetter(0))
+    rivals = [landscape.best_away_from(pose.x_px, apart)]
+    rivals += [(sure, one.x_px) for sure, one in verified if abs(one.x_px - pose.x_px) > apart]
     rival, rival_x = max(rivals)
     distinct = (1 - rival) / max(1 - best, 1e-6)
     share = float(np.clip((distinct - 1) / (_DISTINCT - 1), 0, 1))

@@ -5,7 +5,6 @@ over a dark floor. Here only what changes along a row within a few degrees count
 bright and in dark places; a horizon, which fits at every offset, and noise count for little.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import ceil, radians
 
@@ -13,11 +12,8 @@ import cv2
 import numpy as np
 from fisheye_geometry.surface import Surface
 
-from panorama_stitch.particles import facing_halves
-
 _RIM_PX = 2
 """The edge of what a lens sees is half dark."""
-_FINE_SMOOTHING_PX = 1.0
 _SMOOTHING_PX = 1.4
 _WINDOW_PX = 25
 """What changes more slowly along a row than over this width is no structure."""
@@ -28,13 +24,13 @@ _NOISE_LEVEL = 3.0
 
 
 @dataclass(frozen=True)
-class Reduced:
-    """A picture or its structure, reduced in size.
+class Structure:
+    """The structure of a picture, reduced in size.
 
     Attributes
     ----------
     image
-        (h, w) float32, 0 where nothing is seen.
+        (h, w) float32, mostly -3 to 3, 0 where nothing is seen.
     valid
         (h, w) uint8: 1 where the lens sees something, with a margin, else 0.
     """
@@ -45,39 +41,55 @@ class Reduced:
 
 @dataclass(frozen=True)
 class Facing:
-    """The facing halves of a pair of pictures, reduced by `step`.
+    """The structures of the facing sides of a pair of pictures, reduced by `step`.
 
     Attributes
     ----------
     left, right
-        The halves.
+        The structures.
     surface
         What the right one shows.
     level_y_px
-        Vertical offset of the right half in the left one if the rig is level.
+        Vertical offset of the right one in the left one if the rig is level.
     step
         Pixels of the pictures to one of these.
     """
 
-    left: Reduced
-    right: Reduced
+    left: Structure
+    right: Structure
     surface: Surface
     level_y_px: float
     step: int
+
+    @property
+    def px_per_deg(self) -> float:
+        """Pixels of these pictures to a degree in their centre."""
+        return self.surface.focal_px * radians(1)
 
 
 def face(
     left: np.ndarray,
     right: np.ndarray,
-    surface_left: Surface,
     surface_right: Surface,
+    level_y_px: float,
     px_per_deg: float,
-    how: Callable[[np.ndarray, int], Reduced],
 ) -> Facing:
-    """Reduce the facing halves of two grey pictures to about `px_per_deg`, never enlarging."""
+    """Find the structure of two facing parts of pictures.
+
+    Parameters
+    ----------
+    left, right
+        (height, width) uint8, cut from the pictures' facing sides; 0 where nothing is seen.
+    surface_right
+        What the right picture shows.
+    level_y_px
+        Vertical offset of the right picture in the left one if the rig is level.
+    px_per_deg
+        Resolution to reduce the pictures to; they are never enlarged.
+    """
     step = max(1, round(surface_right.focal_px * radians(1) / px_per_deg))
-    halves = [how(half, step) for half in facing_halves(left, right)]
-    height, width = halves[1].image.shape
+    left, right = structure(left, step), structure(right, step)
+    height, width = right.image.shape
     surface = replace(
         surface_right,
         width=width,
@@ -86,11 +98,10 @@ def face(
         center_x_px=(surface_right.center_x_px + 0.5) / step - 0.5,
         center_y_px=(surface_right.center_y_px + 0.5) / step - 0.5,
     )
-    level_y_px = (surface_left.center_y_px - surface_right.center_y_px) / step
-    return Facing(*halves, surface, level_y_px, step)
+    return Facing(left, right, surface, level_y_px / step, step)
 
 
-def structure(picture: np.ndarray, step: int) -> Reduced:
+def structure(picture: np.ndarray, step: int) -> Structure:
     """Find the structure of a picture (height, width) uint8, reduced by `step`."""
     picture, valid = _reduce(picture, step)
     weight = valid.astype(np.float32)
@@ -98,19 +109,11 @@ def structure(picture: np.ndarray, step: int) -> Reduced:
     detail = (smooth - _trend(smooth * weight, weight)) * weight
     square = (_NEIGHBOURHOOD_PX, _NEIGHBOURHOOD_PX)
     contrast = _average(detail * detail, weight, cv2.blur, square)
-    return Reduced(detail / np.sqrt(contrast + _NOISE_LEVEL**2), valid)
-
-
-def plain(picture: np.ndarray, step: int) -> Reduced:
-    """Reduce a picture (height, width) uint8 by `step` and smooth it a little."""
-    picture, valid = _reduce(picture, step)
-    weight = valid.astype(np.float32)
-    smooth = _average(picture * weight, weight, cv2.GaussianBlur, (0, 0), _FINE_SMOOTHING_PX)
-    return Reduced(smooth * weight, valid)
+    return Structure(detail / np.sqrt(contrast + _NOISE_LEVEL**2), valid)
 
 
 def _reduce(picture, step):
-    """Reduce a picture to float32, and tell which pixels are made of seen ones only."""
+    """Reduce a picture, and tell which pixels are made of seen ones only."""
     height, width = (side // step for side in picture.shape)
     picture = picture[: height * step, : width * step]
     seen = cv2.compare(picture, 0, cv2.CMP_GT)
@@ -126,7 +129,7 @@ def _reduce(picture, step):
         borderType=cv2.BORDER_CONSTANT,
         borderValue=0,
     )
-    return picture.astype(np.float32), valid
+    return picture, valid
 
 
 def _average(image, weight, smooth, *how):

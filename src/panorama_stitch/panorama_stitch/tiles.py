@@ -16,7 +16,7 @@ _COLUMNS, _ROWS = 4, 18
 """At most so many tiles across and down the overlap."""
 _SEEN_SHARE = 0.8
 _LIKELY_TILT_RAD = radians(1.5)
-_LIKELY_RISE_RAD = radians(0.5)
+_LIKELY_RISE_RAD = radians(0.2)
 """How far mounts are usually off: what decides where the overlap does not."""
 _TILTS_RAD = tuple(radians(tilt) for tilt in (0.0, -1.5, 1.5))
 _BEST = 0.9
@@ -76,22 +76,20 @@ class Tiles:
 
     def search(self) -> np.ndarray:
         """Find the likeliest step (4,) from the start on a grid of shifts and tilts."""
-        tilts = product(_TILTS_RAD, repeat=2) if self._tilt else [(0.0, 0.0)]
-        steps = [self._best_shift(np.array(tilt)) for tilt in tilts]
-        return max(steps, key=lambda step: step[0])[1]
-
-    def _best_shift(self, tilt):
-        """Add up the tiles' maps, each moved by what the tilt does to it."""
-        moves = self._center - self._reach + self._jacobian[:, :, 2:] @ tilt
-        side = 2 * self._reach + 1
-        total = np.zeros((side, side), np.float32)
-        for one, (dx, dy) in zip(self._likelihood, moves, strict=True):
-            total += cv2.warpAffine(one, np.array([[1, 0, -dx], [0, 1, -dy]]), (side, side))
-        y, x = np.unravel_index(np.argmax(total), total.shape)
-        step = np.array([x - self._reach, y - self._reach, *tilt], float)
+        tilts = np.array(list(product(_TILTS_RAD, repeat=2))) if self._tilt else np.zeros((1, 2))
+        reach, side = self._reach, 2 * self._reach + 1
+        moves = self._center - reach + np.einsum('nkt,mt->mnk', self._jacobian[:, :, 2:], tilts)
+        moves = np.clip(np.rint(moves).astype(int), -reach, reach)
+        columns, rows = (moves[..., [k]] + reach + np.arange(side) for k in (0, 1))
+        padded = np.pad(self._likelihood, ((0, 0), (reach, reach), (reach, reach)))
+        tile = np.arange(len(self))[:, None, None]
+        # What each tile says of each shift, moved by what each tilt does to it: (tilt, y, x).
+        total = padded[tile, rows[..., :, None], columns[..., None, :]].sum(axis=1)
         precision, usual = self._prior
-        miss = step - usual
-        return float(total[y, x] - 0.5 * miss @ precision @ miss), step
+        unlikely = 0.5 * ((tilts - usual[2:]) ** 2) @ np.diag(precision)[2:]
+        total -= unlikely[:, None, None]
+        tilt, y, x = np.unravel_index(np.argmax(total), total.shape)
+        return np.array([x - reach, y - reach, *tilts[tilt]], float)
 
     def climb(self, step: np.ndarray) -> np.ndarray:
         """Go uphill from a step (4,) to the likeliest one, to a fraction of a pixel."""
