@@ -31,6 +31,8 @@ bench: build ## measure rates and delays (also bench-overlap, bench-calibration,
 bench-%: build
 	@$(run) python benchmarks/$*.py $(ARGS)
 
+bench: export PYTHONPATH := tools:$(PYTHONPATH)
+
 docs: build ## write the parameter tables of docs/ anew
 	@$(run) python tools/parameter_tables.py
 

@@ -1,0 +1,200 @@
+"""Raw pair to finished panorama, beside what the same pixels cost in any case.
+
+The floor is two `cv2.remap` with fixed-point maps that correct both whole frames. `one remap`
+draws the whole panorama at once from both frames, one above the other. `naive` is what one would
+write first: two remaps of what shows, and a feather by `cv2.blendLinear`. Ratios are of the tenth
+percentiles, which a busy machine disturbs least.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from pairs import Pair, synthetic_pair
+from targets import Target
+from timing import Spread, interleaved, spread
+
+from fisheye_geometry.lens import Lens
+from fisheye_geometry.surface import Surface
+from panorama_stitch.compositor import BLENDS, Compositor
+from panorama_stitch.layout import Layout
+from panorama_stitch.settings import PanoramaSettings
+
+SIZES = (640, 480), (1280, 960), (1920, 1080)
+FLAGS = {'nearest': cv2.INTER_NEAREST, 'linear': cv2.INTER_LINEAR, 'cubic': cv2.INTER_CUBIC}
+UNLIKE = 1.0, 1.3
+"""Exposures with which gain compensation has something to do."""
+ROUNDS = {'nearest': 80, 'linear': 80, 'cubic': 12}
+WAYS = ('floor', 'one remap', 'naive', 'memcpy', *BLENDS, 'feather, gain')
+
+
+@dataclass(frozen=True)
+class Composing:
+    """Times of all ways to compose pictures of one size, ms, and their ratios."""
+
+    width: int
+    height: int
+    interpolation: str
+    threads: int
+    megapixels: float
+    times_ms: dict[str, Spread]
+    to_floor: dict[str, float]
+    to_one_remap: dict[str, float]
+
+    @property
+    def name(self) -> str:
+        """Say what was measured."""
+        return f'{self.width}x{self.height} {self.interpolation}, {self.threads} thread(s)'
+
+    @property
+    def ms_per_megapixel(self) -> float:
+        """What a megapixel of panorama costs with a feather."""
+        return self.times_ms['feather'].low / self.megapixels
+
+
+def measure_composing(short: bool) -> list[Composing]:
+    """Measure every size, interpolation and number of threads; `short`: the one that matters."""
+    every_core = cv2.getNumThreads()
+    results = []
+    for size in SIZES[:1] if short else SIZES:
+        for interpolation in ('linear',) if short else FLAGS:
+            ways, megapixels = prepare(size, interpolation)
+            for threads in sorted({1, every_core}):
+                cv2.setNumThreads(threads)
+                times = interleaved(ways, ROUNDS[interpolation])
+                results.append(summary(size, interpolation, threads, megapixels, times))
+    cv2.setNumThreads(every_core)
+    return results
+
+
+def composing_targets(results: list[Composing]) -> list[Target]:
+    """Give what composing has to reach."""
+    targets = []
+    for result in results:
+        way = {'linear': 'feather', 'nearest': 'none'}.get(result.interpolation)
+        if way:
+            targets.append(Target(f'{result.name}, {way}, floors', result.to_floor[way], 1.0))
+        if (result.width, result.interpolation) == (640, 'linear'):
+            ratio = result.to_one_remap['feather']
+            targets.append(Target(f'{result.name}, feather, remaps', ratio, 1.0))
+            ratio = result.to_floor['feather, gain'] / result.to_floor['feather']
+            targets.append(Target(f'{result.name}, with gain over without', ratio, 1.1))
+    for kind in sorted({(r.interpolation, r.threads) for r in results}):
+        costs = [r.ms_per_megapixel for r in results if (r.interpolation, r.threads) == kind]
+        what = '{}, {} thread(s), dearest over cheapest megapixel'.format(*kind)
+        targets.append(Target(what, max(costs) / min(costs), 1.5))
+    return targets
+
+
+def summary(size, interpolation: str, threads: int, megapixels: float, times) -> Composing:
+    """Reduce times to spreads and ratios."""
+    spreads = {way: spread(times[way]) for way in WAYS}
+    to_floor, to_one_remap = (
+        {way: spreads[way].low / spreads[unit].low for way in WAYS}
+        for unit in ('floor', 'one remap')
+    )
+    return Composing(*size, interpolation, threads, megapixels, spreads, to_floor, to_one_remap)
+
+
+def prepare(size: tuple[int, int], interpolation: str) -> tuple[dict[str, Callable], float]:
+    """Give functions that compose a pair in every way, and the megapixels of a panorama."""
+    equal, unlike = synthetic_pair(*size), synthetic_pair(*size, UNLIKE)
+    ways = {}
+    for blend in BLENDS:
+        ways[blend], _ = composing(equal, blend, interpolation, gain=False)
+    ways['feather, gain'], _ = composing(unlike, 'feather', interpolation, gain=True)
+    compositor = compositor_of(equal, 'feather', interpolation, gain=False)
+    layout, surface = compositor.layout, compositor.layout.surface
+    views = [view.surface for view in compositor.views]
+    panorama = np.empty((surface.height, surface.width, 3), np.uint8)
+    other = panorama.copy()
+    ways['memcpy'] = lambda: np.copyto(panorama, other)
+    ways['floor'] = floor(equal, views, interpolation)
+    ways['one remap'] = one_remap(equal, views, layout, interpolation, panorama)
+    ways['naive'] = naive(equal, views, layout, interpolation, panorama)
+    return {way: ways[way] for way in WAYS}, surface.width * surface.height / 1e6
+
+
+def compositor_of(pair: Pair, blend: str, interpolation: str, gain: bool) -> Compositor:
+    """Build the product's compositor."""
+    settings = PanoramaSettings(blend=blend, interpolation=interpolation, gain_compensation=gain)
+    return pair.stitcher(settings).compositor(settings, pair.images)
+
+
+def composing(pair: Pair, blend: str, interpolation: str, gain: bool):
+    """Give a function that composes a pair, and the array (height, width, 3) that it fills."""
+    compositor = compositor_of(pair, blend, interpolation, gain)
+    surface = compositor.layout.surface
+    out = np.empty((surface.height, surface.width, 3), np.uint8)
+    return lambda: compositor.compose(pair.images, out), out
+
+
+def floor(pair: Pair, surfaces: list[Surface], interpolation: str) -> Callable[[], None]:
+    """Correct both whole frames."""
+    tables = [
+        fixed(positions(lens, surface), interpolation)
+        for lens, surface in zip(pair.lenses, surfaces, strict=True)
+    ]
+    outs = [np.empty((surface.height, surface.width, 3), np.uint8) for surface in surfaces]
+
+    def correct():
+        for image, table, out in zip(pair.images, tables, outs, strict=True):
+            cv2.remap(image, *table, FLAGS[interpolation], dst=out)
+
+    return correct
+
+
+def one_remap(pair: Pair, surfaces, layout: Layout, interpolation: str, out: np.ndarray):
+    """Draw the whole panorama at once."""
+    middle = sum(layout.seams[0]) // 2
+    parts = [
+        positions(lens, part(surface, layout, index, *columns))
+        for index, (lens, surface, columns) in enumerate(
+            zip(pair.lenses, surfaces, ((0, middle), (middle, out.shape[1])), strict=True)
+        )
+    ]
+    parts[1][..., 1] += len(pair.images[0])
+    table = fixed(np.concatenate(parts, axis=1), interpolation)
+    stacked = np.vstack(pair.images)
+    return lambda: cv2.remap(stacked, *table, FLAGS[interpolation], dst=out)
+
+
+def naive(pair: Pair, surfaces, layout: Layout, interpolation: str, out: np.ndarray):
+    """Draw what shows of each view, and feather where both do."""
+    begin, end = layout.seams[0]
+    tables = [
+        fixed(positions(lens, part(surface, layout, i, *layout.drawn(i))), interpolation)
+        for i, (lens, surface) in enumerate(zip(pair.lenses, surfaces, strict=True))
+    ]
+    right = np.empty((len(out), out.shape[1] - begin, 3), np.uint8)
+    ramp = np.tile((np.arange(end - begin, dtype=np.float32) + 0.5) / (end - begin), (len(out), 1))
+
+    def compose():
+        cv2.remap(pair.images[0], *tables[0], FLAGS[interpolation], dst=out[:, :end])
+        cv2.remap(pair.images[1], *tables[1], FLAGS[interpolation], dst=right)
+        strip = out[:, begin:end]
+        cv2.blendLinear(strip, right[:, : end - begin], 1 - ramp, ramp, dst=strip)
+        out[:, end:] = right[:, end - begin :]
+
+    return compose
+
+
+def part(surface: Surface, layout: Layout, index: int, begin: int, end: int) -> Surface:
+    """Give columns of the panorama as a window of a view's surface."""
+    origin = layout.origins[index]
+    return surface.window(begin - origin.x_px, -origin.y_px, end - begin, layout.surface.height)
+
+
+def positions(lens: Lens, surface: Surface) -> np.ndarray:
+    """(height, width, 2) float32: where in the picture each pixel of a surface comes from."""
+    y, x = np.ogrid[: surface.height, : surface.width]
+    pixels, seen = lens.project(surface.rays(x, y))
+    return np.where(seen[..., None], pixels, -100).astype(np.float32)
+
+
+def fixed(where: np.ndarray, interpolation: str) -> tuple[np.ndarray, np.ndarray | None]:
+    """Give fixed-point maps."""
+    nearest = interpolation == 'nearest'
+    pixels, fractions = cv2.convertMaps(where, None, cv2.CV_16SC2, nninterpolation=nearest)
+    return pixels, None if nearest else fractions

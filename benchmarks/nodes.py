@@ -1,0 +1,210 @@
+"""The nodes end to end: rates, delays and cost, as a subscriber in another process sees them."""
+
+import os
+import tempfile
+import time
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import cv2
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from pairs import SIDES, synthetic_pair
+from rig import Rig, camera_parameters, unused_domain, wait_for
+from targets import Target
+from watcher import Watcher
+
+from fisheye_geometry.camera_file import Camera, write_camera
+
+FULL_SPEED_HZ = 1000.0
+ONE_CORE = ('taskset', '--cpu-list', '0')
+START_TIMEOUT_S = 60.0
+SETTLE_S = 2.0
+_TICKS_PER_S = os.sysconf('SC_CLK_TCK')
+
+
+@dataclass(frozen=True)
+class Setup:
+    """A rig to run, and what it has to reach: numbers of `Run` by name, the most or the least."""
+
+    name: str
+    size: tuple[int, int]
+    frame_rate_hz: float = FULL_SPEED_HZ
+    composed: bool = True
+    prefix: tuple[str, ...] = ()
+    most: dict[str, float] = field(default_factory=dict)
+    least: dict[str, float] = field(default_factory=dict)
+
+
+SMALL, LARGE = (640, 480), (1280, 960)
+SETUPS = (
+    Setup(
+        'one node 640x480, full speed',
+        SMALL,
+        most={'memory_mib': 256, 'first_s': 3},
+        least={'rate_hz': 100},
+    ),
+    Setup('the same, on one core', SMALL, prefix=ONE_CORE, least={'rate_hz': 50}),
+    Setup('one node 640x480, 30 Hz', SMALL, 30.0, most={'p99_ms': 25}),
+    Setup('one node 1280x960, full speed', LARGE, least={'rate_hz': 40}),
+    Setup('one node 1280x960, 30 Hz', LARGE, 30.0),
+    Setup('five nodes 640x480, 30 Hz', SMALL, 30.0, False, most={'p99_ms': 50, 'missing': 0}),
+    Setup('five nodes 1280x960, 30 Hz', LARGE, 30.0, False),
+)
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a subscriber saw of a rig, and what the rig's processes used.
+
+    Attributes
+    ----------
+    first_s
+        From the start of the processes to the first panorama.
+    rate_hz
+        Panoramas that came a second.
+    p50_ms, p95_ms, p99_ms
+        Percentiles of the latency from capture to subscriber.
+    lost
+        Panoramas that were published but did not come.
+    missing
+        Points of the time grid without a panorama; at full speed nobody counts them.
+    cpu_ms
+        Processor time of all nodes for one panorama.
+    memory_mib
+        Resident memory of the largest node.
+    """
+
+    name: str
+    first_s: float
+    rate_hz: float
+    p50_ms: float
+    p95_ms: float
+    p99_ms: float
+    lost: int
+    missing: int | None
+    cpu_ms: float
+    memory_mib: float
+    calibration_s: float
+
+
+class Counts:
+    """How many panoramas a node says it published, beside how many came."""
+
+    def __init__(self, watcher: Watcher):
+        self._watcher = watcher
+        self._pairs: list[tuple[int, int]] = []
+        watcher.node.create_subscription(DiagnosticArray, '/diagnostics', self._take, 10)
+
+    def restart(self) -> None:
+        """Forget what was said so far."""
+        self._pairs = []
+
+    @property
+    def lost(self) -> int:
+        """Published but not received between the first report and the last."""
+        if len(self._pairs) < 2:
+            return 0
+        published, received = np.subtract(self._pairs[-1], self._pairs[0])
+        return max(0, int(published - received))
+
+    def _take(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            for entry in status.values:
+                if entry.key == 'panoramas published':
+                    self._pairs.append((int(entry.value), len(self._watcher.stamps_ns)))
+
+
+def measure_nodes(seconds: float, log_folder: Path) -> Iterator[Run]:
+    """Run every setup, each watched for so many seconds."""
+    for setup in SETUPS:
+        yield run_rig(setup, seconds, log_folder)
+
+
+def node_targets(runs: Iterable[Run]) -> list[Target]:
+    """Give what the nodes have to reach."""
+    setups = {setup.name: setup for setup in SETUPS}
+    targets = []
+    for run in runs:
+        for limits, is_least in ((setups[run.name].most, False), (setups[run.name].least, True)):
+            for what, limit in limits.items():
+                measured = getattr(run, what)
+                targets.append(Target(f'{run.name}, {what}', measured, limit, is_least))
+    return targets
+
+
+def run_rig(setup: Setup, seconds: float, log_folder: Path) -> Run:
+    """Run a rig on pictures held in memory and watch it for a while."""
+    domain = unused_domain()
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        Watcher(domain) as watcher,
+        Rig(domain, log_folder) as rig,
+    ):
+        cameras = camera_parameters(save_pair(Path(folder), setup.size))
+        counts = Counts(watcher)
+        begin = time.monotonic()
+        start(rig, cameras, setup)
+        wait_for(lambda: rig.check_alive() or watcher.newest, START_TIMEOUT_S, 'a first panorama')
+        first_s = time.monotonic() - begin
+        begin = time.monotonic()
+        watcher.calibrate()
+        calibration_s = time.monotonic() - begin
+        time.sleep(SETTLE_S)
+        watcher.restart()
+        counts.restart()
+        before_s, begin = cpu_s(rig), time.monotonic()
+        time.sleep(seconds)
+        stamps_ns, latencies_ms = watcher.stamps_ns[:], watcher.latencies_ms[:]
+        used_s, passed_s = cpu_s(rig) - before_s, time.monotonic() - begin
+        rig.check_alive()
+        due = round((stamps_ns[-1] - stamps_ns[0]) * 1e-9 * setup.frame_rate_hz) + 1
+        is_free = setup.frame_rate_hz == FULL_SPEED_HZ
+        return Run(
+            setup.name,
+            first_s,
+            len(stamps_ns) / passed_s,
+            *(float(v) for v in np.percentile(latencies_ms, (50, 95, 99))),
+            lost=counts.lost,
+            missing=None if is_free else due - len(stamps_ns),
+            cpu_ms=used_s / len(stamps_ns) * 1e3,
+            memory_mib=max(memory_mib(process.pid) for process in rig.processes.values()),
+            calibration_s=calibration_s,
+        )
+
+
+def start(rig: Rig, cameras: dict[str, dict[str, object]], setup: Setup) -> None:
+    """Start the nodes."""
+    if not setup.composed:
+        rig.start_all(False, cameras, frame_rate_hz=setup.frame_rate_hz)
+        return
+    own = {f'{side}.{name}': v for side, entries in cameras.items() for name, v in entries.items()}
+    rig.start('panorama', setup.prefix, **own, frame_rate_hz=setup.frame_rate_hz)
+
+
+def save_pair(folder: Path, size: tuple[int, int]) -> Path:
+    """Write pictures and calibration of the synthetic rig."""
+    pair = synthetic_pair(*size)
+    for side, lens, image in zip(SIDES, pair.lenses, pair.images, strict=True):
+        cv2.imwrite(str(folder / f'{side}.png'), image)
+        write_camera(folder / f'{side}.yaml', Camera(side, lens))
+    return folder
+
+
+def cpu_s(rig: Rig) -> float:
+    """Processor time that the nodes have used."""
+    return sum(_ticks(process.pid) for process in rig.processes.values()) / _TICKS_PER_S
+
+
+def _ticks(pid: int) -> int:
+    fields = Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()
+    return int(fields[11]) + int(fields[12])
+
+
+def memory_mib(pid: int) -> float:
+    """Resident memory of a process."""
+    for line in Path(f'/proc/{pid}/status').read_text().splitlines():
+        if line.startswith('VmRSS:'):
+            return int(line.split()[1]) / 1024
+    return 0.0
