@@ -7,7 +7,7 @@ import numpy as np
 
 from fisheye_geometry.errors import CalibrationError, CameraFileError
 from fisheye_geometry.lens import Lens, make_lens
-from fisheye_geometry.yaml_file import read_mapping, write_mapping
+from fisheye_geometry.yaml_file import is_number, read_mapping, shown, write_mapping
 
 _IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
@@ -55,10 +55,9 @@ def read_camera(path: str | Path) -> Camera:
         size = [_integer(entries, key) for key in ('image_width', 'image_height')]
         matrix = _numbers(entries, 'camera_matrix', {9})
         distortion = _numbers(entries, 'distortion_coefficients', {0, 4, 5, 8})
-        model = entries.get('distortion_model')
-        lens = make_lens(model, *size, matrix, distortion)
+        lens = make_lens(_text(entries, 'distortion_model'), *size, matrix, distortion)
         return Camera(
-            name=str(entries.get('camera_name') or ''),
+            name=_text(entries, 'camera_name'),
             lens=lens,
             rectification=_numbers(entries, 'rectification_matrix', {9}, _IDENTITY),
             projection=_numbers(entries, 'projection_matrix', {12}, ()),
@@ -97,9 +96,17 @@ def _matrix(rows: int, cols: int, data) -> dict:
 
 def _integer(entries: dict, key: str) -> int:
     value = entries.get(key)
-    if type(value) is not int:
-        raise CameraFileError(f'{key} is {value!r}; expected a whole number of pixels')
+    if type(value) is not int or not is_number(value):
+        raise CameraFileError(f'{key} is {shown(value)}; expected a whole number of pixels')
     return value
+
+
+def _text(entries: dict, key: str) -> str:
+    value = entries.get(key, '')
+    if isinstance(value, (list, dict)):
+        raise CameraFileError(f'{key} is {shown(value)}; expected text')
+    # A name may look like a number.
+    return value if isinstance(value, str) else shown(value)
 
 
 def _numbers(entries: dict, key: str, counts: set[int], default=None) -> tuple[float, ...]:
@@ -109,11 +116,13 @@ def _numbers(entries: dict, key: str, counts: set[int], default=None) -> tuple[f
     entry = entries.get(key)
     data = entry.get('data') if isinstance(entry, dict) else None
     if not isinstance(data, list):
-        raise CameraFileError(f'{key} is {entry!r:.80}; expected `rows`, `cols` and `data: [...]`')
+        raise CameraFileError(
+            f'{key} is {shown(entry)}; expected `rows`, `cols` and `data: [...]`'
+        )
     if len(data) not in counts:
         expected = ' or '.join(map(str, sorted(counts)))
         raise CameraFileError(f'{key} has {len(data)} numbers; expected {expected}')
     for value in data:
-        if type(value) not in (int, float) or not np.isfinite(value):
-            raise CameraFileError(f'{key} holds {value!r:.40}; expected finite numbers')
+        if not is_number(value):
+            raise CameraFileError(f'{key} holds {shown(value)}; expected finite numbers')
     return tuple(float(value) for value in data)

@@ -1,8 +1,10 @@
 """YAML files that people edit: read with precise errors, never written by halves."""
 
 import os
+import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import yaml
 
@@ -31,7 +33,9 @@ def read_mapping(path: str | Path) -> dict:
             f'{path} is larger than {_MAX_BYTES} bytes; expected a short YAML file'
         )
     try:
-        mapping = yaml.safe_load(content.decode())
+        text = content.decode()
+        _refuse_aliases(path, text)
+        mapping = yaml.safe_load(text)
     except UnicodeDecodeError as error:
         raise CameraFileError(f'{path} is not text (byte {error.start})') from error
     except yaml.MarkedYAMLError as error:
@@ -46,6 +50,29 @@ def read_mapping(path: str | Path) -> dict:
             f'{path} holds {type(mapping).__name__}; expected `key: value` lines'
         )
     return mapping
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value is a finite number that a float can hold; true and false are none."""
+    return type(value) in (int, float) and abs(value) <= sys.float_info.max
+
+
+def shown(value: Any) -> str:
+    """Give a value as it may stand in a sentence."""
+    try:
+        return f'{value!r:.80}'
+    except ValueError:
+        return 'a number of too many digits'  # more than Python writes
+
+
+def _refuse_aliases(path: Path, text: str) -> None:
+    """Refuse references within a file, with which a few lines can mean more than fits."""
+    for token in yaml.scan(text):
+        if isinstance(token, yaml.AliasToken):
+            raise CameraFileError(
+                f'{path} refers to `&{token.value}` at line {token.start_mark.line + 1}; '
+                'expected plain values'
+            )
 
 
 def write_mapping(path: str | Path, mapping: dict) -> None:

@@ -42,6 +42,9 @@ def test_the_synonym_fisheye_is_written_by_its_ros_name(tmp_path):
         ({'camera_matrix': {'data': [0] * 9}}, 'focal_x_px is 0.0; expected'),
         ({'distortion_coefficients': {'data': [0, 0, 0, float('nan')]}}, 'holds nan; expected'),
         ({'distortion_coefficients': {'data': ['a', 0, 0, 0]}}, "holds 'a'; expected finite"),
+        ({'distortion_coefficients': {'data': [10**400, 0, 0, 0]}}, '0; expected finite numbers'),
+        ({'distortion_model': ['fisheye']}, "distortion_model is .'fisheye'.; expected text"),
+        ({'camera_name': {}}, 'camera_name is {}; expected text'),
         ({'distortion_coefficients': {'data': [0] * 5}}, '5 distortion coefficients; .* has 4'),
         ({'projection_matrix': {'data': [0]}}, 'projection_matrix has 1 numbers; expected 12'),
     ],
@@ -81,3 +84,13 @@ def test_a_missing_file_and_an_unwritable_place_are_named(tmp_path):
     (tmp_path / 'file').write_text('')
     with pytest.raises(CameraFileError, match='cannot be written'):
         write_camera(tmp_path / 'file' / 'camera.yaml', CAMERA)
+
+
+def test_what_a_few_lines_could_blow_up_is_refused(tmp_path):
+    path = tmp_path / 'camera.yaml'
+    path.write_text('image_width: 640\na: &many [1, 2]\ncamera_matrix: [*many, *many]\n')
+    with pytest.raises(CameraFileError, match='refers to `&many` at line 3; expected plain'):
+        read_camera(path)
+    path.write_text(f'image_width: 0x{"f" * 5000}')
+    with pytest.raises(CameraFileError, match='image_width is .*; expected a whole number'):
+        read_camera(path)
