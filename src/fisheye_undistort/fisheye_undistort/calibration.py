@@ -110,22 +110,32 @@ def calibrate(
     """
     if not views:
         raise CalibrationError('there is no view of the target to calibrate from')
-    fitter = _Fitter(views, target, size, correct_bias)
-    dropped = {}
+    try:
+        with np.errstate(divide='raise', invalid='raise'):
+            fitter, estimate, dropped = _fit_without_misfits(views, target, size, correct_bias)
+        lens = lens_of(estimate.unknowns, size)
+    except (FloatingPointError, np.linalg.LinAlgError, CalibrationError) as error:
+        raise CalibrationError(
+            f'no lens fits what was seen of the target ({error}); tilt it, and bring it nearer '
+            'and to the edges of the picture'
+        ) from error
+    return Calibration(lens, estimate, tuple(fitter.views), dropped, target)
+
+
+def _fit_without_misfits(views, target, size, correct_bias):
+    """Fit, leave out the views that do not fit, and fit again until all do."""
+    fitter, dropped = _Fitter(views, target, size, correct_bias), {}
     while True:
         ladder = fitter.climb()
         misfits = _misfits(ladder[-1], size)
         if not misfits.any():
-            break
+            return fitter, fitter.choose(ladder), dropped
         rms = ladder[-1].rms_px[misfits]
         dropped |= {
             view.name: f'does not fit: rms {miss:.2f} px'
             for view, miss in zip(compress(fitter.views, misfits), rms, strict=True)
         }
         fitter = _Fitter([*compress(fitter.views, ~misfits)], target, size, correct_bias)
-    estimate = fitter.choose(ladder)
-    lens = lens_of(estimate.unknowns, size)
-    return Calibration(lens, estimate, tuple(fitter.views), dropped, target)
 
 
 class _Fitter:

@@ -228,3 +228,10 @@ def test_twenty_real_views_of_a_chessboard(shun74, half):
     assert abs(lens.focal_y_px / published[1, 1] - 1) < focal
     assert abs(lens.center_x_px - published[0, 2]) < center_px
     assert abs(lens.center_y_px - published[1, 2]) < center_px
+
+
+def test_a_view_that_tells_nothing_is_refused():
+    # Neither perspective nor distortion: the lens could have any focal length.
+    points_px = PAPER.points_mm[:, :2] + (320, 240)
+    with pytest.raises(CalibrationError, match='no lens fits what was seen'):
+        calibrate([View('', points_px, np.arange(9))], PAPER, SIZE)
