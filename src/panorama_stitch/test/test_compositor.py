@@ -122,6 +122,21 @@ def test_pictures_that_are_not_live_teach_nothing_about_brightness(pictures):
     np.testing.assert_array_equal(compositor.gain.factors, before)
 
 
+def test_a_picture_that_is_not_live_does_not_change_the_gain(pictures):
+    views = [View(LENS, SURFACE)] * 2
+    layout = lay_out(views, [(OFFSET, 0.0)], fade_px=10.0, crop='valid')
+    gain = GainCompensation(layout, views, pictures)
+    compositor = Compositor(layout, views, gain=gain)
+    out = np.empty((layout.surface.height, layout.surface.width, 3), np.uint8)
+    dimmed = [pictures[0], pictures[1] // 2]
+    for _ in range(60):
+        compositor.compose(dimmed, out, all_live=False)
+    assert gain.factors == pytest.approx(np.ones((2, 3)), rel=0.01)
+    for _ in range(60):
+        compositor.compose(dimmed, out)
+    assert gain.factors.min() < 0.9
+
+
 def test_both_ways_give_the_same_picture(pictures):
     raw = composed(*views_of(pictures, corrected=False), offset_px=round(OFFSET), crop='none')[1]
     rect = composed(*views_of(pictures, corrected=True), offset_px=round(OFFSET), crop='none')[1]
