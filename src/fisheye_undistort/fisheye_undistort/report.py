@@ -65,9 +65,8 @@ class Report:
         angle, azimuth = self.calibration.directions_rad
         rings = int(np.ceil(np.degrees(max(self.edge_rad, angle.max())) / RING_DEG))
         ring = (np.degrees(angle) // RING_DEG).astype(int).clip(0, rings - 1)
-        sector = ((azimuth / (2 * np.pi) + 1) * SECTORS + 0.5).astype(int) % SECTORS
         counts = np.zeros((rings, SECTORS), int)
-        np.add.at(counts, (ring, sector), 1)
+        np.add.at(counts, (ring, _sector(azimuth)), 1)
         return counts
 
     @cached_property
@@ -84,7 +83,7 @@ class Report:
         if reach < _MIN_REACH * edge:
             yield f'no points beyond {reach:.0f} degrees, and the picture shows {edge:.0f}'
         outer = azimuth[angle > _HALF_WAY * self.edge_rad]
-        sectors = len(np.unique(((outer / (2 * np.pi) + 1) * SECTORS + 0.5).astype(int) % SECTORS))
+        sectors = len(np.unique(_sector(outer)))
         if sectors < _MIN_SECTORS:
             yield (
                 f'points beyond {_HALF_WAY * edge:.0f} degrees in only {sectors} of '
@@ -171,3 +170,8 @@ class Report:
             span = f'{ring * RING_DEG}-{(ring + 1) * RING_DEG}'
             sectors = np.count_nonzero(row)
             yield f'  {span:>7} deg {count:5} in {sectors} of {SECTORS} directions  {bar}'
+
+
+def _sector(azimuth_rad: np.ndarray) -> np.ndarray:
+    """Which of `SECTORS` an angle about the axis lies in; the first is to the right."""
+    return ((azimuth_rad / (2 * np.pi) + 1) * SECTORS + 0.5).astype(int) % SECTORS
