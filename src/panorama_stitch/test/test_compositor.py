@@ -130,7 +130,7 @@ def test_a_picture_that_is_not_live_does_not_change_the_gain(pictures):
     out = np.empty((layout.surface.height, layout.surface.width, 3), np.uint8)
     dimmed = [pictures[0], pictures[1] // 2]
     for _ in range(60):
-        compositor.compose(dimmed, out, all_live=False)
+        compositor.compose(dimmed, out, are_live=False)
     assert gain.factors == pytest.approx(np.ones((2, 3)), rel=0.01)
     for _ in range(60):
         compositor.compose(dimmed, out)
