@@ -23,7 +23,7 @@ test: build ## run every test: those of each package, then those across packages
 	@$(run) bash tools/run_tests.bash
 
 test-faults: build ## only the tests of cables pulled, cameras gone and files broken (LONG=1: longer)
-	@$(run) python -m pytest test/test_faults.py $(ARGS)
+	@$(run) python -m pytest -s test/test_faults*.py $(ARGS)
 
 bench: build ## measure rates and delays (also bench-overlap, bench-calibration, bench-quality)
 	@$(run) python benchmarks/bench.py $(ARGS)

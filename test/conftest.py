@@ -1,9 +1,11 @@
-"""What the tests across packages share: real pictures and real processes."""
+"""What the tests across packages share: real pictures, real processes, and ways to hurt them."""
 
 import os
 from pathlib import Path
 
+import hypothesis
 import pytest
+from field import Field
 from rig import Rig, unused_domain
 from watcher import Watcher
 
@@ -44,3 +46,25 @@ def watcher(domain):
     """Give a subscriber in the rig's domain."""
     with Watcher(domain) as watcher:
         yield watcher
+
+
+# Not beside the tests.
+hypothesis.configuration.set_hypothesis_home_dir(
+    Path(__file__).parents[1] / 'build' / 'hypothesis'
+)
+
+
+@pytest.fixture(scope='module')
+def five(tmp_path_factory):
+    """Give five nodes on two network cameras, running."""
+    with Field(unused_domain(), tmp_path_factory.mktemp('five')) as field:
+        field.start_five()
+        yield field
+
+
+@pytest.fixture(scope='module')
+def one(tmp_path_factory):
+    """Give the panorama node on two network cameras, running."""
+    with Field(unused_domain(), tmp_path_factory.mktemp('one')) as field:
+        field.start_one()
+        yield field

@@ -70,6 +70,7 @@ class Rig:
 
     def __init__(self, domain: int, log_folder: Path, environment: dict[str, str] | None = None):
         self.processes: dict[str, subprocess.Popen] = {}
+        self._commands: dict[str, list[str]] = {}
         self._log_folder = log_folder
         self._log_folder.mkdir(parents=True, exist_ok=True)
         self._environment = {**os.environ, 'ROS_DOMAIN_ID': str(domain), **(environment or {})}
@@ -90,9 +91,18 @@ class Rig:
         command = [*prefix, str(executable(node)), '--ros-args', '-r', f'__ns:=/{namespace}']
         for name, value in parameters.items():
             command += ['-p', f'{name}:={value}']
+        self._commands[node] = command
+        self.start_again(node)
+
+    def start_again(self, node: str) -> None:
+        """Start a node that ended, as it was started before."""
         with self.log(node).open('ab') as log:
             self.processes[node] = subprocess.Popen(
-                command, stdout=log, stderr=log, env=self._environment, stdin=subprocess.DEVNULL
+                self._commands[node],
+                stdout=log,
+                stderr=log,
+                env=self._environment,
+                stdin=subprocess.DEVNULL,
             )
 
     def start_all(self, composed: bool, cameras: dict[str, dict[str, object]], **capture: object):

@@ -92,5 +92,5 @@ def test_what_a_few_lines_could_blow_up_is_refused(tmp_path):
     with pytest.raises(CameraFileError, match='refers to `&many` at line 3; expected plain'):
         read_camera(path)
     path.write_text(f'image_width: 0x{"f" * 5000}')
-    with pytest.raises(CameraFileError, match='image_width is .*; expected a whole number'):
+    with pytest.raises(CameraFileError, match=r'image_width is .*; expected a whole number'):
         read_camera(path)

@@ -1,0 +1,79 @@
+"""What can happen to the left camera of a field, and what has to follow."""
+
+import time
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from field import START_S, Field
+from mjpeg_server import jpeg
+from rig import wait_for
+
+OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+LIVELY = 0.7
+"""Share of its pictures that a busy machine shows of the living side at least."""
+
+
+def stop(cameras):
+    cameras.stop('left')
+    return lambda: cameras.start('left')
+
+
+def stall(cameras):
+    cameras.servers['left'].stalled.set()
+    return cameras.servers['left'].stalled.clear
+
+
+def send_garbage(cameras):
+    cameras.show('left', bytes(range(256)) * 40)
+    return lambda: cameras.show('left')
+
+
+def send_nothing(cameras):
+    cameras.show('left', b'')
+    return lambda: cameras.show('left')
+
+
+def come_back_smaller(cameras):
+    def come_back(picture=None):
+        cameras.stop('left')
+        cameras.start('left')
+        cameras.show('left', picture)
+
+    come_back(jpeg(90, 320, 240))
+    return come_back
+
+
+def check_camera_fault(field: Field, break_it, capture: str, stitcher: str) -> None:
+    """Break the left camera: dimmed and said; the right goes on; mended: all as before.
+
+    Parameters
+    ----------
+    break_it
+        One of the functions above; gives the one that mends.
+    capture, stitcher
+        The nodes that have to complain.
+    """
+    health, cameras = field.health, field.cameras
+
+    def both_complain():
+        lost = health.level(capture) == ERROR
+        return (
+            lost
+            and health.level(stitcher) >= WARN
+            and 'left: no picture for' in health.status[stitcher].message
+        )
+
+    with field.injured(f'left camera: {break_it.__name__}', 'left'):
+        mend = break_it(cameras)
+        try:
+            wait_for(lambda: health.is_dim(health.seen[-1])[0], START_S, 'the dimming')
+            wait_for(both_complain, START_S, 'the complaints')
+            said = health.status[capture].message
+            before_s, stamp_ns = time.monotonic(), time.time_ns()
+            wait_for(lambda: health.seen[-1].arrived_s > before_s + 1, START_S, 'another second')
+            living = [entry for entry in health.seen if entry.stamp_ns > stamp_ns]
+            assert len(living) > LIVELY * cameras.RATE_HZ, 'the rate of the living side'
+        finally:
+            mend()
+    print(f'  {capture} said: {said}')
+    wait_for(lambda: health.level(capture) < ERROR, START_S, 'no ERROR any more')
+    wait_for(lambda: health.level(stitcher) == OK, START_S, 'all well')
