@@ -1,33 +1,35 @@
-"""Handing things to a slower thread: only the newest waits."""
+"""Handing things to a slower thread: only the newest wait."""
 
+from collections import deque
 from collections.abc import Callable
 from threading import Condition, Thread
 from typing import Any
 
 
 class Newest:
-    """A thread that does something with the newest thing put in, and never falls behind.
+    """A thread that does something with the newest things put in, and never falls behind.
 
     Attributes
     ----------
     dropped
-        Things that a newer one replaced before their turn.
+        Things that newer ones replaced before their turn.
     """
 
-    def __init__(self, work: Callable[[Any], None], name: str):
+    def __init__(self, work: Callable[[Any], None], name: str, waiting: int = 1):
+        """Start; so many things may be `waiting` while one is in work."""
         self.dropped = 0
         self._work = work
-        self._next = None
+        self._waiting = deque(maxlen=waiting)
         self._is_stopped = False
         self._changed = Condition()
         self._thread = Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
     def put(self, thing: Any) -> None:
-        """Have a thing worked on next, in place of one that still waits."""
+        """Have a thing worked on, in place of the oldest where too many wait."""
         with self._changed:
-            self.dropped += self._next is not None
-            self._next = thing
+            self.dropped += len(self._waiting) == self._waiting.maxlen
+            self._waiting.append(thing)
             self._changed.notify()
 
     def stop(self) -> None:
@@ -40,8 +42,8 @@ class Newest:
     def _run(self):
         while True:
             with self._changed:
-                self._changed.wait_for(lambda: self._is_stopped or self._next is not None)
+                self._changed.wait_for(lambda: self._is_stopped or self._waiting)
                 if self._is_stopped:
                     return
-                thing, self._next = self._next, None
+                thing = self._waiting.popleft()
             self._work(thing)

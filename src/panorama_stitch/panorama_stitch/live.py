@@ -22,6 +22,10 @@ from panorama_stitch.stale import dimmed
 from panorama_stitch.stitcher import Stitcher
 
 
+_WAITING = 2
+"""Groups that may wait to be composed: a moment without the processor loses none."""
+
+
 class _Last(NamedTuple):
     """The last frame of a camera, and when it came."""
 
@@ -85,7 +89,7 @@ class LiveStitcher:
         self._last = {camera: _Last(None, monotonic()) for camera in settings.cameras}
         self._paired_s = monotonic()
         self._dark: dict[str, tuple[np.ndarray, np.ndarray]] = {}
-        self._composing = Newest(self._compose, 'compose')
+        self._composing = Newest(self._compose, 'compose', _WAITING)
 
     @property
     def compositor(self) -> Compositor | None:
