@@ -88,7 +88,9 @@ def main() -> int:
             drawn[case.group] = drawn.get(case.group, 0) + 1
             if options.pictures and drawn[case.group] <= len(METHODS) * PICTURES:
                 options.pictures.mkdir(parents=True, exist_ok=True)
-                path = options.pictures / f'{case.group} {case.name} {method}.jpg'.replace(' ', '_')
+                path = options.pictures / f'{case.group} {case.name} {method}.jpg'.replace(
+                    ' ', '_'
+                )
                 cv2.imwrite(str(path), draw(case.pictures, case.surfaces, overlap))
     options.out.mkdir(parents=True, exist_ok=True)
     report = [asdict(result) for result in results]
@@ -125,7 +127,12 @@ def _real() -> Iterator[Case]:
         pair = folder_pair(folder)
         group = 'real' if truth['overlaps'] else 'real apart'
         yield _case(
-            group, pair.name, pair.lenses, pair.images, 'cylindrical', truth['offset_deg'],
+            group,
+            pair.name,
+            pair.lenses,
+            pair.images,
+            'cylindrical',
+            truth['offset_deg'],
             truth['overlaps'],
         )
         if truth['overlaps'] and truth['offset_deg']:
@@ -133,8 +140,13 @@ def _real() -> Iterator[Case]:
     for one, other in permutations(pairs, 2):
         left, right = pairs[one], pairs[other]
         yield _case(
-            'real apart', f'{one} and {other}', (left.lenses[0], right.lenses[1]),
-            (left.images[0], right.images[1]), 'cylindrical', None, False,
+            'real apart',
+            f'{one} and {other}',
+            (left.lenses[0], right.lenses[1]),
+            (left.images[0], right.images[1]),
+            'cylindrical',
+            None,
+            False,
         )
 
 
@@ -183,10 +195,18 @@ def _compare(case: Case, method: str, overlap: Overlap, ms: float, times: float)
         error_px = overlap.offset_x_px - level - left.focal_px * radians(case.offset_deg)
         error_deg = degrees(error_px / left.focal_px)
     return Result(
-        group=case.group, name=case.name, method=method, decided=overlap.method,
-        expected=case.overlaps, found=overlap.found,
+        group=case.group,
+        name=case.name,
+        method=method,
+        decided=overlap.method,
+        expected=case.overlaps,
+        found=overlap.found,
         offset_deg=degrees((overlap.offset_x_px - level) / left.focal_px),
-        error_px=error_px, error_deg=error_deg, confidence=overlap.confidence, ms=ms, times=times,
+        error_px=error_px,
+        error_deg=error_deg,
+        confidence=overlap.confidence,
+        ms=ms,
+        times=times,
         message=overlap.message,
     )
 
@@ -199,14 +219,17 @@ def _print_table(results: list[Result]) -> None:
     for method in METHODS:
         for group in dict.fromkeys(result.group for result in results):
             of = [r for r in results if (r.method, r.group) == (method, group)]
-            known = [r for r in of if r.error_deg == r.error_deg or not r.found and r.expected]
+            known = [r for r in of if r.error_deg == r.error_deg or (not r.found and r.expected)]
             errors = np.array([r.error_deg for r in known if r.found])
             shares = [
                 f'{np.mean([r.found and abs(getattr(r, key)) <= most for r in known]):8.1%}'
-                if known and of[0].expected else '       -'
+                if known and of[0].expected
+                else '       -'
                 for key, most in (('error_px', 1.0), ('error_deg', RIGHT_DEG))
             ]
-            worst = f'{np.abs(errors).max():9.2f}' if len(errors) and of[0].expected else '        -'
+            worst = (
+                f'{np.abs(errors).max():9.2f}' if len(errors) and of[0].expected else '        -'
+            )
             print(
                 f'{method:11} {group:11} {len(of):7} {shares[0]}  {shares[1]:>10}  {worst}  '
                 f'{sum(r.expected and not r.found for r in of):6}  '

@@ -1,4 +1,4 @@
-"""A picture of what overlap calibration did: particles, the matched pair, the overlap, the seam."""
+"""A picture of what overlap calibration did: particles and their match, overlap and seam."""
 
 import cv2
 import numpy as np

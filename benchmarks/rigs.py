@@ -1,8 +1,7 @@
 """Random two-camera rigs in random worlds whose true overlap is known; equal seeds, equal rigs."""
 
 from dataclasses import dataclass, field
-from functools import partial
-from math import cos, pi, radians, tan
+from math import pi, radians, tan
 
 import cv2
 import numpy as np
@@ -82,9 +81,12 @@ def random_rig(seed: int, overlaps: bool = True) -> Rig:
         common_deg=min(seen_deg, seen_deg) - offset_deg if overlaps else -1.0,
         overlaps=overlaps,
         about={
-            'size': f'{width}x{height}', 'exposure': round(float(exposure), 2),
-            'noise': round(noise, 1), 'parallax_deg': round(parallax_deg, 2),
-            'tilt_deg': [round(float(t), 2) for t in tilt], 'style': style,
+            'size': f'{width}x{height}',
+            'exposure': round(float(exposure), 2),
+            'noise': round(noise, 1),
+            'parallax_deg': round(parallax_deg, 2),
+            'tilt_deg': [round(float(t), 2) for t in tilt],
+            'style': style,
         },
     )
 
@@ -98,8 +100,14 @@ def random_lens(rng, width: int, height: int, fov_deg: float) -> FisheyeLens:
     focal = width / 2 / float(radius[0])
     shift = rng.uniform(-0.01, 0.01, 2) * width
     return FisheyeLens(
-        width, height, focal, focal, (width - 1) / 2 + shift[0], (height - 1) / 2 + shift[1],
-        distortion, visible_angle_rad=edge,
+        width,
+        height,
+        focal,
+        focal,
+        (width - 1) / 2 + shift[0],
+        (height - 1) / 2 + shift[1],
+        distortion,
+        visible_angle_rad=edge,
     )
 
 
@@ -130,7 +138,9 @@ def see(lens: Lens, world: np.ndarray, turn: Turn, place, room: bool) -> np.ndar
     )
     where, _ = sphere.project(points)
     picture = cv2.remap(
-        world, *np.moveaxis(where.astype(np.float32), -1, 0), cv2.INTER_LINEAR,
+        world,
+        *np.moveaxis(where.astype(np.float32), -1, 0),
+        cv2.INTER_LINEAR,
         borderMode=cv2.BORDER_WRAP,
     )
     return np.where(seen, picture, 0.0)
@@ -182,7 +192,9 @@ def _texture(rng, coarsest: int, finest: int, rough: float) -> np.ndarray:
         wrapped = np.hstack([noise, noise[:, :2]])
         width = WORLD_WIDTH * (cells + 2) // cells
         fine = cv2.resize(wrapped, (width, shape[0]), interpolation=cv2.INTER_CUBIC)
-        total += fine[:, WORLD_WIDTH // cells // 2 :][:, :WORLD_WIDTH] * (coarsest / cells) ** rough
+        total += (
+            fine[:, WORLD_WIDTH // cells // 2 :][:, :WORLD_WIDTH] * (coarsest / cells) ** rough
+        )
         cells *= 2
     return total / max(float(total.std()), 1e-6)
 
@@ -204,7 +216,7 @@ def _shapes(rng, world, count, low=0.15, high=0.85):
             if kind == 0:
                 cv2.ellipse(world, ((x + by, y), (a, b), angle), level, -1, cv2.LINE_AA)
             elif kind == 1:
-                cv2.fillPoly(world, [np.int32(corners + (by, 0))], level, cv2.LINE_AA)
+                cv2.fillPoly(world, [np.int32(corners + np.array([by, 0]))], level, cv2.LINE_AA)
             else:
                 first, last = (int(x + by - a), int(y - b)), (int(x + by + a), int(y + b))
                 cv2.rectangle(world, first, last, level, -1)
@@ -226,10 +238,12 @@ def _make_room(rng):
     world = _blank(rng) * 0.5
     height, width = world.shape
     edges = np.sort(rng.uniform(0, width, rng.integers(4, 9))).astype(int)
-    for left, right in zip(edges, np.roll(edges, -1)):
+    for left, right in zip(edges, np.roll(edges, -1), strict=True):
         right = right if right > left else right + width
         columns = np.arange(left, right) % width
-        world[:, columns] += rng.uniform(-30, 30) + np.linspace(0, rng.uniform(-20, 20), len(columns))
+        world[:, columns] += rng.uniform(-30, 30) + np.linspace(
+            0, rng.uniform(-20, 20), len(columns)
+        )
     floor, ceiling = int(height * rng.uniform(0.58, 0.7)), int(height * rng.uniform(0.25, 0.38))
     world[:ceiling] = rng.uniform(60, 100) + _texture(rng, 8, 16, 1)[:ceiling] * 3
     world[floor:] = rng.uniform(-90, 0) + _floor(rng, height - floor, floor / height)
@@ -269,7 +283,9 @@ def _make_street(rng):
     height, width = world.shape
     horizon = height // 2
     world[:horizon] += 80 + _texture(rng, 8, 64, 1)[:horizon] * rng.uniform(2, 15)
-    world[horizon:] += _texture(rng, 32, 1024, rng.uniform(0.3, 0.9))[horizon:] * rng.uniform(5, 25)
+    world[horizon:] += _texture(rng, 32, 1024, rng.uniform(0.3, 0.9))[horizon:] * rng.uniform(
+        5, 25
+    )
     x = 0
     while x < width:
         wide = int(rng.uniform(0.02, 0.1) * width)

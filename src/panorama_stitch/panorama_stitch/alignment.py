@@ -38,7 +38,9 @@ def align(facing: Facing, start: Pose, tilt: bool) -> Pose:
         Whether the right camera may be turned.
     """
     tiles = Tiles(facing, start, _SEARCH_RAD, tilt)
-    return _checked(facing, start, tiles.climb(tiles.search()), _SEARCH_RAD) if len(tiles) else start
+    return (
+        _checked(facing, start, tiles.climb(tiles.search()), _SEARCH_RAD) if len(tiles) else start
+    )
 
 
 def refine(facing: Facing, start: Pose, tilt: bool) -> Pose:

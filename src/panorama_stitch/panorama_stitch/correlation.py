@@ -74,7 +74,7 @@ class Landscape:
 
 
 def correlate(facing: Facing, x: Sequence[int], y: Sequence[int]) -> Landscape:
-    """Correlate two structures at the offsets `x`, `y`: consecutive numbers, px of the structures."""
+    """Correlate two structures at offsets `x`, `y`: consecutive numbers, px of the structures."""
     rows, columns = np.asarray(y), np.asarray(x)
     shape = tuple(
         cv2.getOptimalDFTSize(max(a, b) + int(np.abs(offsets).max()))

@@ -10,14 +10,14 @@ from math import degrees, isnan, nan, radians
 
 import cv2
 import numpy as np
+
 from fisheye_geometry.errors import OverlapError
 from fisheye_geometry.remap import LEVEL, Turn
 from fisheye_geometry.settings import setting
 from fisheye_geometry.surface import Surface
-
 from panorama_stitch import paper
 from panorama_stitch.particles import Particle
-from panorama_stitch.registration import Registration, Search, register
+from panorama_stitch.registration import Registration, Search, fit_at, register
 
 METHODS = ('particles', 'correlation', 'paper')
 
@@ -33,41 +33,71 @@ class OverlapSettings:
         'particles',
         'how the overlap is found: particles that propose and correlation that verifies, '
         'correlation over all offsets, or the published rule as it is',
-        choices=METHODS, live=True,
+        choices=METHODS,
+        live=True,
     )
     min_confidence: float = setting(
-        0.3, 'confidence below which two views count as having no common scene',
-        minimum=0.0, maximum=1.0, live=True,
+        0.3,
+        'confidence below which two views count as having no common scene',
+        minimum=0.0,
+        maximum=1.0,
+        live=True,
     )
     expected_yaw_deg: float = setting(
-        nan, 'angle between neighbouring optical axes, deg; decides where the scene repeats '
-        'itself; NaN: not known', minimum=0.0, maximum=360.0, nan=True, live=True,
+        nan,
+        'angle between neighbouring optical axes, deg; decides where the scene repeats '
+        'itself; NaN: not known',
+        minimum=0.0,
+        maximum=360.0,
+        nan=True,
+        live=True,
     )
     yaw_tolerance_deg: float = setting(
-        5.0, 'how far the overlap may lie from expected_yaw_deg, deg',
-        minimum=0.1, maximum=180.0, live=True,
+        5.0,
+        'how far the overlap may lie from expected_yaw_deg, deg',
+        minimum=0.1,
+        maximum=180.0,
+        live=True,
     )
     min_overlap_deg: float = setting(
-        5.0, 'narrower overlaps are not looked for, deg', minimum=2.0, maximum=90.0, live=True,
+        5.0,
+        'narrower overlaps are not looked for, deg',
+        minimum=2.0,
+        maximum=90.0,
+        live=True,
     )
     max_rise_deg: float = setting(
-        4.0, 'how far the right picture may lie above or below the left one, deg',
-        minimum=0.0, maximum=20.0, live=True,
+        4.0,
+        'how far the right picture may lie above or below the left one, deg',
+        minimum=0.0,
+        maximum=20.0,
+        live=True,
     )
     correct_tilt: bool = setting(
-        True, 'whether the small pitch and roll of the right camera are measured and corrected',
+        True,
+        'whether the small pitch and roll of the right camera are measured and corrected',
         live=True,
     )
     paper_classes: int = setting(
-        2, "classes that the paper's threshold sorts grey levels into", minimum=2, maximum=8,
+        2,
+        "classes that the paper's threshold sorts grey levels into",
+        minimum=2,
+        maximum=8,
         live=True,
     )
     paper_opening_px: int = setting(
-        3, "side of the square that opens the paper's particles, px", minimum=1, maximum=31,
+        3,
+        "side of the square that opens the paper's particles, px",
+        minimum=1,
+        maximum=31,
         live=True,
     )
     paper_erosions: int = setting(
-        9, "erosions that the paper's particles must survive", minimum=0, maximum=100, live=True,
+        9,
+        "erosions that the paper's particles must survive",
+        minimum=0,
+        maximum=100,
+        live=True,
     )
 
 
@@ -196,6 +226,9 @@ class _Measurement:
     def run(self, method: str) -> Overlap:
         if method == 'paper':
             return self._by_paper()
+        if np.array_equal(self._left, self._right):
+            message = 'both views are the same picture; is one camera used twice, or both covered?'
+            return side_by_side(self._surfaces[0], method, message)
         search = Search(
             x_px=self._expected(),
             max_rise_deg=self._settings.max_rise_deg,
@@ -214,7 +247,10 @@ class _Measurement:
     def _by_paper(self) -> Overlap:
         s = self._settings
         left, right, match = paper.find_match(
-            self._left, self._right, classes=s.paper_classes, opening=s.paper_opening_px,
+            self._left,
+            self._right,
+            classes=s.paper_classes,
+            opening=s.paper_opening_px,
             erosions=s.paper_erosions,
         )
         if match is None:
@@ -229,6 +265,7 @@ class _Measurement:
             offset_x_px=x,
             offset_y_px=0.0,
             overlap_px=max(0.0, width - x),
+            confidence=fit_at(self._left, self._right, *self._surfaces, x),
             min_correlation_value=match.min_correlation_value,
             left_particles=left,
             right_particles=right,
@@ -281,7 +318,7 @@ class _Measurement:
     def _not_found(self, method, found) -> Overlap:
         needed = self._settings.min_confidence
         message = f'no common scene: confidence {found.confidence:.2f}, {needed:.2f} is needed'
-        if found.rival_x_px is not None:
+        if found.fit >= needed:
             here, there = (self._where(x) for x in (found.pose.x_px, found.rival_x_px))
             message = (
                 f'the scene repeats itself: {here} and {there} fit alike; set expected_yaw_deg or '
@@ -300,7 +337,7 @@ class _Measurement:
         if max(abs(pitch), abs(roll)) >= 0.05:
             parts.append(f'its camera pitched by {pitch:.2f} and rolled by {roll:.2f} degrees')
         parts.append(f'confidence {found.confidence:.2f}')
-        if found.rival_x_px is not None:
+        if found.distinct < 1:
             parts.append(f'though {self._where(found.rival_x_px)} fits nearly as well')
         return ', '.join(parts)
 
@@ -316,7 +353,10 @@ class _Measurement:
 def side_by_side(surface_left: Surface, method: str, message: str) -> Overlap:
     """Give the overlap of views that share nothing: whole, one beside the other."""
     return Overlap(
-        method=method, found=False, offset_x_px=float(surface_left.width), offset_y_px=0.0,
+        method=method,
+        found=False,
+        offset_x_px=float(surface_left.width),
+        offset_y_px=0.0,
         message=message,
     )
 

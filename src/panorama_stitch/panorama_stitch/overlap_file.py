@@ -8,7 +8,6 @@ from fisheye_geometry.errors import CameraFileError
 from fisheye_geometry.remap import Turn
 from fisheye_geometry.surface import Surface
 from fisheye_geometry.yaml_file import read_mapping, write_mapping
-
 from panorama_stitch.overlap import METHODS, Overlap
 
 VERSION = 1
@@ -41,14 +40,17 @@ def write_overlaps(
     CameraFileError
         If the file cannot be written.
     """
-    write_mapping(path, {
-        'version': VERSION,
-        'cameras': [_camera(*camera) for camera in zip(cameras, surfaces, strict=True)],
-        'overlaps': [
-            _entry(*neighbours)
-            for neighbours in zip(cameras[:-1], cameras[1:], overlaps, strict=True)
-        ],
-    })
+    write_mapping(
+        path,
+        {
+            'version': VERSION,
+            'cameras': [_camera(*camera) for camera in zip(cameras, surfaces, strict=True)],
+            'overlaps': [
+                _entry(*neighbours)
+                for neighbours in zip(cameras[:-1], cameras[1:], overlaps, strict=True)
+            ],
+        },
+    )
 
 
 def read_overlaps(

@@ -126,10 +126,19 @@ def measure(binary: np.ndarray, most: int | None = None) -> np.ndarray:
     first[flat[inside]] = inside  # the last one written is the first one seen
     first_y, first_x = np.divmod(first[chosen], binary.shape[1])
     left, top, width, height, area = stats[chosen].T
-    return np.column_stack([
-        centers[chosen], first_x, first_y, left, top, left + width, top + height, area,
-        100.0 * area / max(binary.size, 1),
-    ])
+    return np.column_stack(
+        [
+            centers[chosen],
+            first_x,
+            first_y,
+            left,
+            top,
+            left + width,
+            top + height,
+            area,
+            100.0 * area / max(binary.size, 1),
+        ]
+    )
 
 
 def scaled(properties: np.ndarray, scale: float) -> np.ndarray:

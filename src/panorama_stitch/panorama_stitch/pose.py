@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+
 from fisheye_geometry.remap import Turn
 from fisheye_geometry.surface import Surface
 
@@ -27,9 +28,7 @@ class Pose:
     def moved(self, step: np.ndarray) -> 'Pose':
         """Give the pose after a step (4,) in x, y, pitch and roll."""
         x, y, pitch, roll = map(float, step)
-        return Pose(
-            self.x_px + x, self.y_px + y, self.pitch_rad + pitch, self.roll_rad + roll
-        )
+        return Pose(self.x_px + x, self.y_px + y, self.pitch_rad + pitch, self.roll_rad + roll)
 
     def scaled(self, factor: float) -> 'Pose':
         """Give the same pose in pixels of another size."""

@@ -6,8 +6,8 @@ from math import inf, radians
 from operator import itemgetter
 
 import numpy as np
-from fisheye_geometry.surface import Surface
 
+from fisheye_geometry.surface import Surface
 from panorama_stitch.alignment import align, certainty, refine
 from panorama_stitch.correlation import Landscape, correlate
 from panorama_stitch.particles import facing_halves
@@ -22,8 +22,9 @@ _CANDIDATES = 8
 _MOST_VERIFIED = 3
 _CLOSE = 0.15
 """An offset whose score is this much below the best one may still be the right one."""
-_DISTINCT = 1.4
-"""Any other offset leaves at least this much more unexplained where the scene is distinct."""
+_DISTINCT_RATIO, _DISTINCT_MARGIN = 1.4, 0.1
+"""Where the scene is distinct, any other offset leaves this many times more unexplained, and its
+fit is this much lower; less can come from noise, or from the edges of the pictures."""
 
 
 @dataclass(frozen=True)
@@ -59,10 +60,12 @@ class Registration:
     ----------
     pose
         px of the halves.
-    confidence
-        0 to 1; where a second offset fits nearly as well it is lower than that fit.
+    fit
+        Correlation of the structure of the overlap, less what chance may give; 0 to 1.
+    distinct
+        0 to 1: how far any other offset is from fitting as well.
     rival_x_px
-        The second offset; None where there is none.
+        The other offset that fits best.
     proposals
         The particles that proposed it, px of the halves; None where the full search did.
     match
@@ -70,13 +73,16 @@ class Registration:
     """
 
     pose: Pose
-    confidence: float
-    rival_x_px: float | None = None
+    fit: float = 0.0
+    distinct: float = 0.0
+    rival_x_px: float = 0.0
     proposals: Proposals | None = None
     match: tuple[int, int] = (-1, -1)
 
-
-_NOTHING = Registration(Pose(0.0, 0.0), 0.0)
+    @property
+    def confidence(self) -> float:
+        """0 to 1: the fit, lowered where another offset fits nearly as well."""
+        return self.fit * self.distinct
 
 
 def register(
@@ -106,21 +112,35 @@ def register(
     facing = face(left, right, surface_right, level_y_px, _SEARCH_PX_PER_DEG)
     landscape = _explore(facing, search)
     if landscape is None:
-        return _NOTHING
+        return Registration(Pose(0.0, 0.0))
     offsets = landscape.peaks(_CANDIDATES, round(_APART_DEG * facing.px_per_deg))
     proposals, proposed = None, []
     if by_particles:
         proposals = propose(facing, search.max_rise_deg * facing.px_per_deg)
         proposed = proposals.offsets(landscape, _CANDIDATES)
     best = _verify(facing, landscape, [*proposed, *offsets], search.tilt)
-    rival_x_px = None if best.rival_x_px is None else best.rival_x_px * facing.step
     if any(abs(x - best.pose.x_px) <= _APART_DEG * facing.px_per_deg for x, _ in proposed):
         match = proposals.match_at(best.pose.x_px, best.pose.y_px)
         best = replace(best, proposals=proposals.scaled(facing.step), match=match)
     pose = best.pose.scaled(facing.step)
     if best.confidence >= search.min_confidence:
         pose = _refine(left, right, surface_right, level_y_px, pose, search.tilt)
-    return replace(best, pose=pose, rival_x_px=rival_x_px)
+    return replace(best, pose=pose, rival_x_px=best.rival_x_px * facing.step)
+
+
+def fit_at(
+    left: np.ndarray,
+    right: np.ndarray,
+    surface_left: Surface,
+    surface_right: Surface,
+    offset_x_px: float,
+) -> float:
+    """Tell how well the right one of two grey pictures fits at an offset, 0 to 1."""
+    left, right = facing_halves(left, right)
+    level_y_px = surface_left.center_y_px - surface_right.center_y_px
+    facing = face(left, right, surface_right, level_y_px, _SEARCH_PX_PER_DEG)
+    half_start = surface_left.width - left.shape[1]
+    return certainty(facing, Pose(offset_x_px - half_start, 0.0).scaled(1 / facing.step))
 
 
 def _refine(left, right, surface_right, level_y_px, pose, tilt) -> Pose:
@@ -166,11 +186,11 @@ def _verify(
         poses = level, align(facing, level, tilt)
         verified.append(max(((certainty(facing, p), p) for p in poses), key=itemgetter(0)))
     if not verified:
-        return _NOTHING
-    best, pose = max(verified, key=itemgetter(0))
+        return Registration(Pose(0.0, 0.0))
+    fit, pose = max(verified, key=itemgetter(0))
     rivals = [landscape.best_away_from(pose.x_px, apart)]
-    rivals += [(sure, one.x_px) for sure, one in verified if abs(one.x_px - pose.x_px) > apart]
-    rival, rival_x = max(rivals)
-    distinct = (1 - rival) / max(1 - best, 1e-6)
-    share = float(np.clip((distinct - 1) / (_DISTINCT - 1), 0, 1))
-    return Registration(pose, best * share, rival_x if share < 1 else None)
+    rivals += [(other, one.x_px) for other, one in verified if abs(one.x_px - pose.x_px) > apart]
+    rival, rival_x_px = max(rivals)
+    less_unexplained = (1 - rival) / max(1 - fit, 1e-6)
+    shares = (less_unexplained - 1) / (_DISTINCT_RATIO - 1), (fit - rival) / _DISTINCT_MARGIN
+    return Registration(pose, fit, float(np.clip(min(shares), 0, 1)), rival_x_px)

@@ -10,6 +10,7 @@ from math import ceil, radians
 
 import cv2
 import numpy as np
+
 from fisheye_geometry.surface import Surface
 
 _RIM_PX = 2

@@ -103,7 +103,7 @@ class Tiles:
             normal = np.einsum('nki,nkl,nlj->ij', jacobian, curvature, jacobian) + precision
             uphill = np.einsum('nki,nk->i', jacobian, slope) + precision @ (usual - step)
             step = step + np.linalg.lstsq(normal, uphill, rcond=None)[0]
-        return step
+        return step if self._tilt else np.append(step[:2], (0.0, 0.0))
 
     def _where(self, step):
         """Places (n, 2) in the tiles' maps that a step leads to."""
@@ -142,7 +142,9 @@ class Tiles:
 def _prior(facing, start, tilt):
     """How likely a step is before anything is seen: precision (4, 4) and likeliest step (4,)."""
     likely_tilt = _LIKELY_TILT_RAD if tilt else 1e-9
-    deviation = np.array([inf, _LIKELY_RISE_RAD * facing.surface.focal_px, likely_tilt, likely_tilt])
+    deviation = np.array(
+        [inf, _LIKELY_RISE_RAD * facing.surface.focal_px, likely_tilt, likely_tilt]
+    )
     usual = np.array([0.0, facing.level_y_px - start.y_px, -start.pitch_rad, -start.roll_rad])
     return np.diag(deviation**-2.0), usual
 
@@ -184,4 +186,6 @@ def _correlate(fit, known, facing, origin, corner, size):
 def _box_sums(values, size):
     """Sum of each `size` x `size` square that lies inside."""
     total = cv2.integral(values)
-    return total[size:, size:] - total[:-size, size:] - total[size:, :-size] + total[:-size, :-size]
+    return (
+        total[size:, size:] - total[:-size, size:] - total[size:, :-size] + total[:-size, :-size]
+    )

@@ -1,0 +1,110 @@
+from dataclasses import replace
+from math import radians
+
+import pytest
+import yaml
+
+from fisheye_geometry.errors import CameraFileError
+from fisheye_geometry.remap import Turn
+from fisheye_geometry.surface import Surface
+from panorama_stitch.overlap import Overlap
+from panorama_stitch.overlap_file import read_overlaps, write_overlaps
+from panorama_stitch.particles import Particle
+
+CAMERAS = ('left', 'middle', 'right')
+SURFACES = tuple(
+    Surface('cylindrical', 662 + i, 872, 223.0528, 330.4 + i, 435.5) for i in range(3)
+)
+FIRST = Overlap(
+    'particles',
+    True,
+    545.02,
+    -1.25,
+    Turn(0.0, radians(1.0), radians(0.8)),
+    116.98,
+    0.8125,
+    message='found',
+)
+SECOND = Overlap('correlation', False, 663.0, 0.0, confidence=0.125, message='no common scene')
+
+
+@pytest.fixture
+def path(tmp_path):
+    path = tmp_path / 'rig' / 'overlap.yaml'
+    write_overlaps(path, CAMERAS, SURFACES, [FIRST, SECOND])
+    return path
+
+
+def edit(path, change):
+    entries = yaml.safe_load(path.read_text())
+    change(entries)
+    path.write_text(yaml.safe_dump(entries))
+
+
+def test_what_was_written_is_read_again(path):
+    first, second = read_overlaps(path, CAMERAS, SURFACES)
+    assert first.turn.pitch_rad == pytest.approx(FIRST.turn.pitch_rad)
+    assert replace(first, turn=FIRST.turn, min_correlation_value=0.0) == replace(
+        FIRST, min_correlation_value=0.0
+    )
+    assert second == replace(SECOND, min_correlation_value=second.min_correlation_value)
+
+
+def test_particles_are_not_kept(path):
+    particle = Particle(*range(10))
+    write_overlaps(
+        path, CAMERAS[:2], SURFACES[:2], [replace(FIRST, left_particles=(particle,), left_match=0)]
+    )
+    (overlap,) = read_overlaps(path, CAMERAS[:2], SURFACES[:2])
+    assert (overlap.left_particles, overlap.left_match) == ((), -1)
+
+
+def test_rounding_of_a_calibration_does_not_matter(path):
+    surfaces = [replace(s, focal_px=s.focal_px + 0.001) for s in SURFACES]
+    assert read_overlaps(path, CAMERAS, surfaces)
+
+
+@pytest.mark.parametrize(
+    ('cameras', 'changes', 'sentence'),
+    [
+        (('left', 'right'), {}, 'for the cameras left, middle, right; these are left, right'),
+        (CAMERAS, {'width': 700}, "camera 'left' at width 662; now it is 700"),
+        (CAMERAS, {'kind': 'equirectangular'}, 'at surface cylindrical; now it is equirect'),
+        (CAMERAS, {'focal_px': 230.0}, 'at focal_px 223.0528; now it is 230'),
+    ],
+)
+def test_another_rig_is_refused(path, cameras, changes, sentence):
+    surfaces = [replace(surface, **changes) for surface in SURFACES[: len(cameras)]]
+    with pytest.raises(CameraFileError, match=sentence) as error:
+        read_overlaps(path, cameras, surfaces)
+    assert str(path) in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ('change', 'sentence'),
+    [
+        (lambda e: e.update(version=2), 'version is 2; expected 1'),
+        (lambda e: e.pop('version'), 'version is None; expected 1'),
+        (lambda e: e.update(cameras='left'), "cameras is 'left'; expected a list"),
+        (lambda e: e.pop('overlaps'), 'overlaps is None; expected a list'),
+        (lambda e: e['overlaps'].pop(), '1 overlaps for 3 cameras; expected one for each pair'),
+        (lambda e: e['overlaps'].reverse(), "the overlap of 'left' and 'middle' is missing"),
+        (lambda e: e['overlaps'][0].update(offset_x_px='far'), "offset_x_px of .* is 'far'"),
+        (lambda e: e['overlaps'][0].update(roll_deg=float('nan')), 'roll_deg of .* is nan'),
+        (lambda e: e['overlaps'][1].update(found='no'), "found of .* is 'no'"),
+        (lambda e: e['overlaps'][1].update(method='magic'), "method of .* is 'magic'"),
+    ],
+)
+def test_a_broken_file_is_refused_with_a_sentence(path, change, sentence):
+    edit(path, change)
+    with pytest.raises(CameraFileError, match=sentence):
+        read_overlaps(path, CAMERAS, SURFACES)
+
+
+def test_a_missing_file_is_told(tmp_path):
+    with pytest.raises(CameraFileError, match='cannot be read'):
+        read_overlaps(tmp_path / 'none.yaml', CAMERAS, SURFACES)
+
+
+def test_nothing_but_the_file_is_left_behind(path):
+    assert [entry.name for entry in path.parent.iterdir()] == [path.name]
