@@ -21,7 +21,6 @@ from panorama_stitch.settings import PanoramaOutputSettings
 from panorama_stitch.stale import dimmed
 from panorama_stitch.stitcher import Stitcher
 
-
 _WAITING = 2
 """Groups that may wait to be composed: a moment without the processor loses none."""
 
