@@ -34,8 +34,14 @@ def run(node_class: type[Node]) -> int:
     node = executor = None
     threading.excepthook = _give_up
     ended = threading.Event()
+
+    def end(*_):
+        ended.set()
+        if node is None:
+            raise KeyboardInterrupt  # it may take seconds until a node is built
+
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: ended.set())
+        signal.signal(number, end)
     try:
         # rclpy's own handlers would end the context while threads of the node still publish.
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
@@ -44,6 +50,8 @@ def run(node_class: type[Node]) -> int:
         executor.add_node(node)
         while not ended.is_set():
             executor.spin_once(timeout_sec=_LONGEST_WAIT_S)
+    except KeyboardInterrupt:
+        pass
     except (FisheyeError, ParameterException, rclpy._rclpy_pybind11.RCLError) as error:
         get_logger(node_class.__name__).fatal(str(error))
         return 1

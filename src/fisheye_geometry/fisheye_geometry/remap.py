@@ -20,8 +20,8 @@ INTERPOLATIONS = tuple(_INTERPOLATIONS)
 
 _OUTSIDE_PX = -100
 """Far enough from the picture that no interpolation reaches it."""
-_BAND_ROWS = 16
-"""Rows drawn at once: so few that what they need of the picture stays in the cache meanwhile."""
+_BAND_PX = 20_000
+"""Rows are drawn in bands of about so many pixels of the picture, which stay in the cache."""
 
 
 @dataclass(frozen=True)
@@ -102,8 +102,9 @@ class RemapTable:
         self.valid = np.empty((surface.height, surface.width), bool)
         self._bands = []
         needed = range(0)
-        for top in range(0, surface.height, _BAND_ROWS):
-            rows = slice(top, min(top + _BAND_ROWS, surface.height))
+        step = max(8, round(_BAND_PX / source.width))
+        for top in range(0, surface.height, step):
+            rows = slice(top, min(top + step, surface.height))
             where, self.valid[rows] = _source_pixels(source, surface, turn, rows)
             nearest = interpolation == 'nearest'
             pixels, fractions = cv2.convertMaps(where, None, cv2.CV_16SC2, nninterpolation=nearest)

@@ -14,17 +14,28 @@ _UNIT = 1 << 14
 
 
 class Blend(Protocol):
-    """Makes one picture of two views."""
+    """Makes one picture of two views.
 
-    def __call__(self, left: np.ndarray, right: np.ndarray) -> None:
+    Attributes
+    ----------
+    is_local
+        Whether a row's blend follows from that row alone.
+    """
+
+    is_local: bool
+
+    def __call__(self, left: np.ndarray, right: np.ndarray, rows: slice = slice(None)) -> None:
         """Blend views (height, width[, channels]) uint8 into the place of the right one.
 
-        The left one is of no use any more afterwards.
+        `rows` says which rows these are, all where the blend is not local. The left view is of no
+        use any more afterwards.
         """
 
 
 class Feather:
     """Fades from the left view into the right one."""
+
+    is_local = True
 
     def __init__(self, left_seen: np.ndarray, right_seen: np.ndarray):
         """Prepare.
@@ -41,9 +52,10 @@ class Feather:
         total = np.maximum(weights[0] + weights[1], np.finfo(np.float32).tiny)
         self._weights = [np.ascontiguousarray(weight / total) for weight in weights]
 
-    def __call__(self, left: np.ndarray, right: np.ndarray) -> None:
+    def __call__(self, left: np.ndarray, right: np.ndarray, rows: slice = slice(None)) -> None:
         """As `Blend`."""
-        cv2.blendLinear(left, right, *self._weights, dst=right)
+        left_weight, right_weight = self._weights
+        cv2.blendLinear(left, right, left_weight[rows], right_weight[rows], dst=right)
 
 
 class Multiband:
@@ -53,6 +65,8 @@ class Multiband:
     E. H. Adelson, "A multiresolution spline with application to image mosaics", 1983,
     https://doi.org/10.1145/245.247).
     """
+
+    is_local = False
 
     def __init__(self, left_seen: np.ndarray, right_seen: np.ndarray):
         """Prepare; parameters as of `Feather`."""
@@ -66,7 +80,7 @@ class Multiband:
         self._levels: list[_Level] = []
         self._shape: tuple[int, ...] = ()
 
-    def __call__(self, left: np.ndarray, right: np.ndarray) -> None:
+    def __call__(self, left: np.ndarray, right: np.ndarray, rows: slice = slice(None)) -> None:
         """As `Blend`."""
         if self._shape != right.shape:
             self._shape = right.shape

@@ -5,19 +5,21 @@ from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
 
+import cv2
 import numpy as np
 
 from panorama_stitch.blend import Blend, Feather, Multiband
 from panorama_stitch.gain import GainCompensation
 from panorama_stitch.layout import Layout, Seam
-from panorama_stitch.parallel import share, thread_count
+from panorama_stitch.parallel import share
 from panorama_stitch.view import Cut, View
 
 _BLENDS = {'feather': Feather, 'multiband': Multiband}
 BLENDS = {'none': 0.0, 'feather': 1.0, 'multiband': 4.0}
 """The ways to blend, and the width of the strip that each needs in units of `feather_deg`."""
-_SLABS_PER_THREAD = 2
-"""So that a thread that is held up leaves work to the others."""
+_ALL_ROWS = slice(None)
+_MOST_SLABS = 4
+"""Rows are shared between so many threads at most: more would wait for Python's lock."""
 
 
 class Compositor:
@@ -54,7 +56,8 @@ class Compositor:
         self.views = tuple(views)
         self.gain = gain
         self._fades = [_Fade(i, layout, views, blend) for i in range(len(layout.seams))]
-        edges = np.linspace(0, layout.surface.height, _SLABS_PER_THREAD * thread_count() + 1)
+        count = min(cv2.getNumberOfCPUs(), _MOST_SLABS)
+        edges = np.linspace(0, layout.surface.height, count + 1)
         slabs = [slice(*rows) for rows in pairwise(edges.round().astype(int))]
         self._parts: list[list[_Part]] = [[] for _ in slabs]
         share(
@@ -89,7 +92,8 @@ class Compositor:
             fade.expect(out)
         share([partial(self._draw, parts, images, out) for parts in self._parts])
         for fade in self._fades:
-            fade.blend(out)
+            if not fade.is_local:
+                fade.blend(_ALL_ROWS, out)
 
     def _prepare(self, parts: list['_Part'], rows: slice) -> None:
         for index, (view, origin) in enumerate(zip(self.views, self.layout.origins, strict=True)):
@@ -101,12 +105,14 @@ class Compositor:
 
     def _draw(self, parts: Sequence['_Part'], images: Sequence[np.ndarray], out: np.ndarray):
         for index, rows, columns, cut in parts:
+            drawn = out[rows, columns]
             if index:
                 self._fades[index - 1].keep(rows, out)
-            drawn = out[rows, columns]
             cut(images[index], drawn)
             if self.gain:
                 self.gain.apply(index, drawn)
+            if index and self._fades[index - 1].is_local:
+                self._fades[index - 1].blend(rows, out)
 
 
 class _Part(NamedTuple):
@@ -140,10 +146,15 @@ class _Fade:
         """Keep some rows of the left view before the right one is drawn."""
         self._left[rows] = out[rows, self._columns]
 
-    def blend(self, out: np.ndarray) -> None:
-        """Blend the views."""
+    @property
+    def is_local(self) -> bool:
+        """Whether some rows can be blended while others are not drawn yet."""
+        return self._blend is not None and self._blend.is_local
+
+    def blend(self, rows: slice, out: np.ndarray) -> None:
+        """Blend some rows of the views."""
         if self._blend:
-            self._blend(self._left, out[:, self._columns])
+            self._blend(self._left[rows], out[rows, self._columns], rows)
 
 
 def _seen(view: View, layout: Layout, index: int, seam: Seam) -> np.ndarray:

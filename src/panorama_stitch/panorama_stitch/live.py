@@ -187,7 +187,7 @@ class LiveStitcher:
     def _compose(self, group: _Group) -> None:
         if not group.ages_s:
             self._preparation.remember(group.images)
-        self._preparation.go_on(group.images)
+        self._preparation.go_on(group.images, is_live=not group.ages_s)
         if self.compositor is None:
             return
         images = [

@@ -13,92 +13,14 @@ import numpy as np
 
 from fisheye_geometry.errors import OverlapError
 from fisheye_geometry.remap import LEVEL, Turn
-from fisheye_geometry.settings import setting
 from fisheye_geometry.surface import Surface
 from panorama_stitch import paper
+from panorama_stitch.overlap_settings import METHODS, OverlapSettings
 from panorama_stitch.particles import Particle
 from panorama_stitch.registration import Registration, Search, fit_at, register
 
-METHODS = ('particles', 'correlation', 'paper')
-
 _FOCAL_TOLERANCE = 1e-3
 """Relative difference of the focal lengths that moves a whole picture by less than a pixel."""
-
-
-@dataclass(frozen=True)
-class OverlapSettings:
-    """How the overlap of two neighbouring cameras is measured."""
-
-    method: str = setting(
-        'particles',
-        'how the overlap is found: particles that propose and correlation that verifies, '
-        'correlation over all offsets, or the published rule as it is',
-        choices=METHODS,
-        live=True,
-    )
-    min_confidence: float = setting(
-        0.3,
-        'confidence below which two views count as having no common scene',
-        minimum=0.0,
-        maximum=1.0,
-        live=True,
-    )
-    expected_yaw_deg: float = setting(
-        nan,
-        'angle between neighbouring optical axes, deg; decides where the scene repeats '
-        'itself; NaN: not known',
-        minimum=0.0,
-        maximum=360.0,
-        nan=True,
-        live=True,
-    )
-    yaw_tolerance_deg: float = setting(
-        5.0,
-        'how far the overlap may lie from expected_yaw_deg, deg',
-        minimum=0.1,
-        maximum=180.0,
-        live=True,
-    )
-    min_overlap_deg: float = setting(
-        5.0,
-        'narrower overlaps are not looked for, deg',
-        minimum=2.0,
-        maximum=90.0,
-        live=True,
-    )
-    max_rise_deg: float = setting(
-        4.0,
-        'how far the right picture may lie above or below the left one, deg',
-        minimum=0.0,
-        maximum=20.0,
-        live=True,
-    )
-    correct_tilt: bool = setting(
-        True,
-        'whether the small pitch and roll of the right camera are measured and corrected',
-        live=True,
-    )
-    paper_classes: int = setting(
-        2,
-        "classes that the paper's threshold sorts grey levels into",
-        minimum=2,
-        maximum=8,
-        live=True,
-    )
-    paper_opening_px: int = setting(
-        3,
-        "side of the square that opens the paper's particles, px",
-        minimum=1,
-        maximum=31,
-        live=True,
-    )
-    paper_erosions: int = setting(
-        9,
-        "erosions that the paper's particles must survive",
-        minimum=0,
-        maximum=100,
-        live=True,
-    )
 
 
 @dataclass(frozen=True)

@@ -7,18 +7,13 @@ from functools import cache
 import cv2
 
 
-def thread_count() -> int:
-    """As many threads as OpenCV may use."""
-    return max(1, cv2.getNumThreads())
-
-
 def share(jobs: Sequence[Callable[[], None]]) -> None:
-    """Run jobs on `thread_count` threads, this one among them; return when all ended.
+    """Run jobs on as many threads as OpenCV may use, this one among them; return when all ended.
 
     What a job raises is raised here.
     """
     left = iter(jobs)
-    helpers = [_pool().submit(_work, left) for _ in range(min(thread_count(), len(jobs)) - 1)]
+    helpers = [_pool().submit(_work, left) for _ in range(min(cv2.getNumThreads(), len(jobs)) - 1)]
     try:
         _work(left)
     finally:

@@ -85,12 +85,12 @@ class Preparation:
                 self._recent.clear()
         self._due_s = 0.0
 
-    def go_on(self, images: Group) -> None:
-        """Start what is due, unless something is in work."""
+    def go_on(self, images: Group, *, is_live: bool) -> None:
+        """Start what is due, unless something is in work; `is_live`: no picture is stale."""
         busy = self._job is not None and not self._job.done()
         if not busy and self._stitcher.is_complete and monotonic() >= self._due_s:
             self._due_s = float('inf')
-            self._job = self._background.do(self._prepare, images)
+            self._job = self._background.do(self._prepare, images, is_live)
 
     def calibrate(self, method: str, save: bool) -> Future:
         """Measure the overlaps anew on the groups that are remembered.
@@ -112,37 +112,42 @@ class Preparation:
         if self.compositor is None:
             self._due_s = monotonic() + _FIRST_PAUSE_S
 
-    def _prepare(self, images: Group) -> None:
+    def _prepare(self, images: Group, is_live: bool) -> None:
         """Find overlaps if there are none, and build the compositor that uses them."""
         stitcher, settings = self._stitcher, self.settings
         if stitcher.overlaps is None and Path(settings.overlap_file).is_file():
             self._read(settings.overlap_file)
         found = stitcher.overlaps and all(overlap.found for overlap in stitcher.overlaps)
-        if not found and settings.auto_calibrate and self._recent:
-            stitcher.overlaps = self._measure(settings.method)
+        groups = self._groups()
+        if not found and settings.auto_calibrate and groups:
+            stitcher.overlaps = stitcher.measure(groups, settings, settings.method)
             if not all(overlap.found for overlap in stitcher.overlaps):
                 self._due_s = monotonic() + self._pause_s
                 self._pause_s = min(2 * self._pause_s, _LONGEST_PAUSE_S)
+        elif not found and settings.auto_calibrate and is_live:
+            # What was remembered was forgotten a moment ago; the next group can be measured.
+            self._due_s = 0.0
+            return
         self._use(images)
 
     def _calibrate(self, method: str, save: bool) -> list[Overlap]:
         if not self._stitcher.is_complete:
             raise OverlapError('it is not known yet what every camera sees; are all running?')
-        measured = self._measure(method or self.settings.method)
+        groups = self._groups()
+        measured = self._stitcher.measure(groups, self.settings, method or self.settings.method)
         former = self._stitcher.overlaps or measured
         self._stitcher.overlaps = [
             new if new.found or not old.found else old
             for new, old in zip(measured, former, strict=True)
         ]
-        self._use(self._recent[-1])
+        self._use(groups[-1])
         if save:
             self._write(measured)
         return measured
 
-    def _measure(self, method: str) -> list[Overlap]:
+    def _groups(self) -> list[Group]:
         with self._lock:
-            groups = list(self._recent)
-        return self._stitcher.measure(groups, self.settings, method)
+            return list(self._recent)
 
     def _use(self, images: Sequence[np.ndarray]) -> None:
         self.compositor = self._stitcher.compositor(self.settings, images)

@@ -22,6 +22,8 @@ _CANDIDATES = 8
 _MOST_VERIFIED = 3
 _CLOSE = 0.15
 """An offset whose score is this much below the best one may still be the right one."""
+_CLEARLY = 0.03
+"""A difference in fit that is not by chance."""
 _DISTINCT_RATIO, _DISTINCT_MARGIN = 1.4, 0.1
 """Where the scene is distinct, any other offset leaves this many times more unexplained, and its
 fit is this much lower; less can come from noise, or from the edges of the pictures."""
@@ -182,9 +184,7 @@ def _verify(
         known = any(abs(x - one.x_px) <= apart for _, one in verified)
         if known or len(verified) == _MOST_VERIFIED or landscape.score_at(x, y) < promising:
             continue
-        level = Pose(float(x), float(y))
-        poses = level, align(facing, level, tilt)
-        verified.append(max(((certainty(facing, p), p) for p in poses), key=itemgetter(0)))
+        verified.append(_align(facing, Pose(float(x), float(y)), tilt))
     if not verified:
         return Registration(Pose(0.0, 0.0))
     fit, pose = max(verified, key=itemgetter(0))
@@ -194,3 +194,10 @@ def _verify(
     less_unexplained = (1 - rival) / max(1 - fit, 1e-6)
     shares = (less_unexplained - 1) / (_DISTINCT_RATIO - 1), (fit - rival) / _DISTINCT_MARGIN
     return Registration(pose, fit, float(np.clip(min(shares), 0, 1)), rival_x_px)
+
+
+def _align(facing: Facing, level: Pose, tilt: bool) -> tuple[float, Pose]:
+    """Align an offset, and tell how well that fits; level where that fits clearly better."""
+    pose = align(facing, level, tilt)
+    fit, level_fit = certainty(facing, pose), certainty(facing, level)
+    return (level_fit, level) if level_fit > fit + _CLEARLY else (fit, pose)
