@@ -5,67 +5,22 @@ the overlap tile by tile, and the winner is refined to a fraction of a pixel.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import degrees, isnan, nan, radians
 
 import cv2
 import numpy as np
 
 from fisheye_geometry.errors import OverlapError
-from fisheye_geometry.remap import LEVEL, Turn
 from fisheye_geometry.surface import Surface
 from panorama_stitch import paper
+from panorama_stitch.overlap_result import Overlap, side_by_side
 from panorama_stitch.overlap_settings import METHODS, OverlapSettings
 from panorama_stitch.particles import Particle
 from panorama_stitch.registration import Registration, Search, fit_at, register
 
 _FOCAL_TOLERANCE = 1e-3
 """Relative difference of the focal lengths that moves a whole picture by less than a pixel."""
-
-
-@dataclass(frozen=True)
-class Overlap:
-    """Where the right picture lies in the left one, and how sure that is.
-
-    Attributes
-    ----------
-    method
-        What decided, one of `METHODS`.
-    found
-        False: no common scene; the offset puts the pictures side by side.
-    offset_x_px, offset_y_px
-        Where the right picture's upper left corner lies in the left picture, after the right
-        camera was turned by `turn`.
-    turn
-        The right camera's small turn that closes the seam; level where not measured.
-    overlap_px
-        Columns that both pictures fill.
-    confidence
-        0 to 1: zero-mean normalised cross-correlation of the structure of the overlap, lowered
-        where a second offset is nearly as good.
-    min_correlation_value
-        The paper's measure for the matched particles; NaN where none matched.
-    left_particles, right_particles
-        What was found in the facing halves.
-    left_match, right_match
-        Indices of the matched pair, -1 where none matched.
-    message
-        One sentence for a person.
-    """
-
-    method: str
-    found: bool
-    offset_x_px: float
-    offset_y_px: float
-    turn: Turn = LEVEL
-    overlap_px: float = 0.0
-    confidence: float = 0.0
-    min_correlation_value: float = nan
-    left_particles: tuple[Particle, ...] = ()
-    right_particles: tuple[Particle, ...] = ()
-    left_match: int = -1
-    right_match: int = -1
-    message: str = ''
 
 
 def measure_overlap(
@@ -270,17 +225,6 @@ class _Measurement:
             return text
         turned = (x_px + self._half_start - self._level_x) / self._surfaces[0].focal_px
         return f'{text} ({degrees(turned):.2f} degrees)'
-
-
-def side_by_side(surface_left: Surface, method: str, message: str) -> Overlap:
-    """Give the overlap of views that share nothing: whole, one beside the other."""
-    return Overlap(
-        method=method,
-        found=False,
-        offset_x_px=float(surface_left.width),
-        offset_y_px=0.0,
-        message=message,
-    )
 
 
 def _grey(picture: np.ndarray) -> np.ndarray:

@@ -1,6 +1,6 @@
 """Registration of two views: offsets are proposed, verified on their structure, and refined."""
 
-from collections.abc import Sequence
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from math import inf, radians
 from operator import itemgetter
@@ -120,7 +120,7 @@ def register(
     if by_particles:
         proposals = propose(facing, search.max_rise_deg * facing.px_per_deg)
         proposed = proposals.offsets(landscape, _CANDIDATES)
-    best = _verify(facing, landscape, [*proposed, *offsets], search.tilt)
+    best = _verify(facing, landscape, {*proposed, *offsets}, search.tilt)
     if any(abs(x - best.pose.x_px) <= _APART_DEG * facing.px_per_deg for x, _ in proposed):
         match = proposals.match_at(best.pose.x_px, best.pose.y_px)
         best = replace(best, proposals=proposals.scaled(facing.step), match=match)
@@ -173,14 +173,14 @@ def _explore(facing: Facing, search: Search) -> Landscape | None:
 def _verify(
     facing: Facing,
     landscape: Landscape,
-    offsets: Sequence[tuple[int, int]],
+    offsets: Collection[tuple[int, int]],
     tilt: bool,
 ) -> Registration:
     """Align the promising offsets, and tell the best of them from any other."""
     apart = _APART_DEG * facing.px_per_deg
     promising = landscape.score.max() - _CLOSE
     verified = []
-    for x, y in offsets:
+    for x, y in sorted(offsets, key=lambda offset: -landscape.score_at(*offset)):
         known = any(abs(x - one.x_px) <= apart for _, one in verified)
         if known or len(verified) == _MOST_VERIFIED or landscape.score_at(x, y) < promising:
             continue
