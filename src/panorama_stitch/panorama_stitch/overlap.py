@@ -19,6 +19,8 @@ from panorama_stitch.overlap_settings import METHODS, OverlapSettings
 from panorama_stitch.particles import Particle
 from panorama_stitch.registration import Registration, Search, fit_at, register
 
+_SMALLEST_PX = 32
+"""Sides of a picture that can hold an overlap."""
 _FOCAL_TOLERANCE = 1e-3
 """Relative difference of the focal lengths that moves a whole picture by less than a pixel."""
 
@@ -77,17 +79,25 @@ def _check(pairs, surface_left, surface_right, method) -> None:
             f'the pictures have focal lengths of {surface_left.focal_px:g} and '
             f'{surface_right.focal_px:g} px; expected one for both'
         )
-    for pair in pairs:
-        for side, picture, surface in zip(
-            ('left', 'right'), pair, (surface_left, surface_right), strict=True
-        ):
-            if picture is None:
-                raise OverlapError(f'the {side} picture is missing')
-            if picture.dtype != np.uint8 or picture.shape[:2] != (surface.height, surface.width):
-                raise OverlapError(
-                    f'the {side} picture is {picture.dtype}{picture.shape}; expected uint8 of '
-                    f'{surface.width}x{surface.height} px'
-                )
+    for surface in (surface_left, surface_right):
+        if min(surface.width, surface.height) < _SMALLEST_PX:
+            raise OverlapError(
+                f'a picture of {surface.width}x{surface.height} px is too small; expected at '
+                f'least {_SMALLEST_PX} px to each side'
+            )
+    for left, right in pairs:
+        _check_picture('left', left, surface_left)
+        _check_picture('right', right, surface_right)
+
+
+def _check_picture(side, picture, surface) -> None:
+    if picture is None:
+        raise OverlapError(f'the {side} picture is missing')
+    if picture.dtype != np.uint8 or picture.shape[:2] != (surface.height, surface.width):
+        raise OverlapError(
+            f'the {side} picture is {picture.dtype}{picture.shape}; expected uint8 of '
+            f'{surface.width}x{surface.height} px'
+        )
 
 
 class _Measurement:

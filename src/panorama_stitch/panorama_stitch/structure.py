@@ -13,6 +13,8 @@ import numpy as np
 
 from fisheye_geometry.surface import Surface
 
+_FEWEST_PX = 8
+"""However narrow the field of view, pictures keep so many rows and columns."""
 _RIM_PX = 2
 """The edge of what a lens sees is half dark."""
 _SMOOTHING_PX = 1.4
@@ -88,7 +90,9 @@ def face(
     px_per_deg
         Resolution to reduce the pictures to; they are never enlarged.
     """
-    step = max(1, round(surface_right.focal_px * radians(1) / px_per_deg))
+    coarsest = min(*left.shape, *right.shape) // _FEWEST_PX
+    step = round(surface_right.focal_px * radians(1) / px_per_deg)
+    step = max(1, min(step, coarsest))
     left, right = structure(left, step), structure(right, step)
     height, width = right.image.shape
     surface = replace(

@@ -22,7 +22,7 @@ from scenes import (
 
 from fisheye_geometry.errors import OverlapError
 from fisheye_geometry.remap import LEVEL, Turn
-from fisheye_geometry.surface import surface_for
+from fisheye_geometry.surface import SURFACES, Surface, surface_for
 from panorama_stitch import registration
 from panorama_stitch.overlap import METHODS, OverlapSettings, measure_overlap
 from panorama_stitch.proposals import Proposals
@@ -248,10 +248,32 @@ class TestInput:
         with pytest.raises(OverlapError, match='one kind'):
             measure(views, (surface, replace(other, kind='equirectangular')))
 
+    def test_a_picture_that_holds_no_overlap(self, town):
+        (surface, _) = town[1]
+        tiny = np.zeros((surface.height, 31), np.uint8)
+        with pytest.raises(OverlapError, match='31x.* is too small'):
+            measure((tiny, tiny), (replace(surface, width=31),) * 2)
+
     def test_an_unknown_method(self, town):
         views, surfaces, _ = town
         with pytest.raises(OverlapError, match="'magic' is not known"):
             measure(views, surfaces, 'magic')
+
+
+@pytest.mark.parametrize('method', METHODS)
+def test_pictures_of_any_size_and_surface_have_an_answer(method):
+    rng = np.random.default_rng(11)
+    for _ in range(20):
+        kind = SURFACES[rng.integers(len(SURFACES))]
+        focal_px = float(np.exp(rng.uniform(0, 6)))
+        surfaces = [
+            Surface(kind, *map(int, rng.integers(32, 120, 2)), focal_px, *rng.uniform(-50, 150, 2))
+            for _ in range(2)
+        ]
+        views = [rng.integers(0, 256, (s.height, s.width)).astype(np.uint8) for s in surfaces]
+        overlap = measure(views, surfaces, method, min_confidence=float(rng.random()))
+        assert 0 <= overlap.confidence <= 1
+        assert np.isfinite([overlap.offset_x_px, overlap.offset_y_px, overlap.overlap_px]).all()
 
 
 @pytest.mark.parametrize('method', METHODS)
