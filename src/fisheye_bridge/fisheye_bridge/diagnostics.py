@@ -8,6 +8,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+_SHED_SHARE = 0.1
+"""Of what comes; less is not worth a warning."""
 
 
 @dataclass
@@ -22,6 +24,26 @@ class Report:
         """Add a sentence; the level rises to its level."""
         self.level = max(self.level, level)
         self.reasons.append(reason)
+
+
+class Shedding:
+    """Warns while more comes than the machine handles."""
+
+    def __init__(self, things: str):
+        """Start; `things` are what is handled, or shed."""
+        self._things = things
+        self._former = 0, 0
+
+    def tell(self, report: Report, handled: int, shed: int) -> None:
+        """Warn if much was shed since the last report; the numbers count from the start."""
+        former, self._former = self._former, (handled, shed)
+        handled, shed = handled - former[0], shed - former[1]
+        if shed > _SHED_SHARE * (handled + shed):
+            report.add(
+                WARN,
+                f'{shed} of the last {handled + shed} {self._things} were shed: '
+                'they come faster than this machine handles them',
+            )
 
 
 class Diagnostics:

@@ -8,7 +8,7 @@ from sensor_msgs.srv import SetCameraInfo
 from std_msgs.msg import Header
 
 from fisheye_bridge.camera_info import camera_info_of, camera_of
-from fisheye_bridge.diagnostics import ERROR, WARN, Diagnostics
+from fisheye_bridge.diagnostics import ERROR, WARN, Diagnostics, Shedding
 from fisheye_bridge.images import ImageBuffer
 from fisheye_bridge.parameters import Parameters
 from fisheye_bridge.qos import IMAGE
@@ -37,6 +37,7 @@ class CaptureNode(Node):
         self._buffer: ImageBuffer | None = None
         self._info, self._described, self._fault = CameraInfo(), None, ''
         self._publishing = Newest(self._publish, 'publish')
+        self._shedding = Shedding('pictures')
         self._grabber = Grabber(self._settings, self._publishing.put, on_change=self._tell)
         self._camera = self._calibration()
         self.create_service(SetCameraInfo, 'set_camera_info', self._set_camera_info)
@@ -126,7 +127,9 @@ class CaptureNode(Node):
         report.values['source'] = self._settings.source
         report.values['rate Hz'] = grabber.rate.hz
         report.values['pictures'] = grabber.frames
-        report.values['pictures skipped'] = grabber.skipped + self._publishing.dropped
+        skipped = grabber.skipped + self._publishing.dropped
+        self._shedding.tell(report, grabber.frames, skipped)
+        report.values['pictures skipped'] = skipped
 
 
 def main() -> int:

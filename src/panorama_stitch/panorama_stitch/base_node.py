@@ -13,7 +13,7 @@ from rclpy.node import Node
 from std_msgs.msg import Header
 
 from fisheye_bridge.awaiting import awaitable
-from fisheye_bridge.diagnostics import ERROR, WARN, Diagnostics, Report
+from fisheye_bridge.diagnostics import ERROR, WARN, Diagnostics, Report, Shedding
 from fisheye_bridge.images import ImageBuffer, converted
 from fisheye_bridge.parameters import Parameters
 from fisheye_bridge.projection import projection_of
@@ -47,6 +47,7 @@ class PanoramaBase(Node):
         self._buffer: ImageBuffer | None = None
         self._encoding = ''
         self._published, self._rate = 0, Rate()
+        self._shedding = Shedding('pairs')
         self._latencies_ms: deque[float] = deque(maxlen=_LATENCIES)
         self._image = ImagePublisher(self, 'panorama/image')
         self._projection = self.create_publisher(Projection, 'panorama/projection', LATCHED)
@@ -150,6 +151,9 @@ class PanoramaBase(Node):
         all_stale = len(ages_s) == len(self.settings.cameras)
         for camera, age_s in ages_s.items():
             report.add(ERROR if all_stale else WARN, f'{camera}: no picture for {age_s:.0f} s')
+        if not ages_s:
+            shed = live.dropped + max(live.pairing.unpaired.values())
+            self._shedding.tell(report, self._published, shed)
         report.values['rate Hz'] = self._rate.hz
         report.values['panoramas published'] = self._published
         report.values.update(figures(live))
