@@ -1,13 +1,13 @@
 """The overlap file: what was measured once, kept for the next start, valid for one rig only."""
 
 from collections.abc import Sequence
-from math import degrees, isfinite, radians
+from math import degrees, inf, radians
 from pathlib import Path
 
 from fisheye_geometry.errors import CameraFileError
 from fisheye_geometry.remap import Turn
 from fisheye_geometry.surface import Surface
-from fisheye_geometry.yaml_file import read_mapping, write_mapping
+from fisheye_geometry.yaml_file import is_number, read_mapping, shown, write_mapping
 from panorama_stitch.overlap import METHODS, Overlap
 
 VERSION = 1
@@ -15,6 +15,7 @@ _SIZE_KEYS = ('width', 'height')
 _LENGTH_KEYS = ('focal_px', 'center_x_px', 'center_y_px')
 _LENGTH_TOLERANCE_PX = 0.01
 """More than rounding, less than anybody sees."""
+_LARGEST_TILT_DEG = 45.0
 _NUMBERS = ('offset_x_px', 'offset_y_px', 'pitch_deg', 'roll_deg', 'overlap_px', 'confidence')
 
 
@@ -67,7 +68,8 @@ def read_overlaps(
     entries = read_mapping(path)
     try:
         if entries.get('version') != VERSION:
-            raise CameraFileError(f'version is {entries.get("version")!r}; expected {VERSION}')
+            version = shown(entries.get('version'))
+            raise CameraFileError(f'version is {version}; expected {VERSION}')
         _check_cameras(_list(entries, 'cameras'), cameras, surfaces)
         measured = _list(entries, 'overlaps')
         if len(measured) != len(cameras) - 1:
@@ -77,7 +79,7 @@ def read_overlaps(
             )
         return [
             _overlap(*neighbours)
-            for neighbours in zip(cameras[:-1], cameras[1:], measured, strict=True)
+            for neighbours in zip(cameras[:-1], cameras[1:], surfaces[:-1], measured, strict=True)
         ]
     except CameraFileError as error:
         raise CameraFileError(f'{path}: {error}') from error
@@ -111,7 +113,7 @@ def _entry(left: str, right: str, overlap: Overlap) -> dict:
 def _list(entries: dict, key: str) -> list[dict]:
     value = entries.get(key)
     if not isinstance(value, list) or not all(isinstance(entry, dict) for entry in value):
-        raise CameraFileError(f'{key} is {value!r:.80}; expected a list of `key: value` blocks')
+        raise CameraFileError(f'{key} is {shown(value)}; expected a list of `key: value` blocks')
     return value
 
 
@@ -119,38 +121,48 @@ def _check_cameras(entries, cameras, surfaces) -> None:
     names = [entry.get('name') for entry in entries]
     if names != list(cameras):
         raise CameraFileError(
-            f'it is for the cameras {", ".join(map(str, names))}; these are {", ".join(cameras)}'
+            f'it is for the cameras {", ".join(map(shown, names))}; these are {", ".join(cameras)}'
         )
     for entry, name, surface in zip(entries, cameras, surfaces, strict=True):
         now = _camera(name, surface)
         for key, value in now.items():
             then = entry.get(key)
-            if key in _LENGTH_KEYS and type(then) in (int, float):
+            if key in _LENGTH_KEYS and is_number(then):
                 if abs(then - value) <= _LENGTH_TOLERANCE_PX:
                     continue
                 value = round(value, 3)
             elif then == value:
                 continue
             raise CameraFileError(
-                f"it was measured with camera '{name}' at {key} {then}; now it is {value}"
+                f"it was measured with camera '{name}' at {key} {shown(then)}; now it is {value}"
             )
 
 
-def _overlap(left: str, right: str, entry: dict) -> Overlap:
+def _overlap(left: str, right: str, surface: Surface, entry: dict) -> Overlap:
     pair = f"the overlap of '{left}' and '{right}'"
     if (entry.get('left'), entry.get('right')) != (left, right):
-        neighbours = f'{entry.get("left")}, {entry.get("right")}'
+        neighbours = f'{shown(entry.get("left"))}, {shown(entry.get("right"))}'
         raise CameraFileError(f'{pair} is missing; found {neighbours}')
+    limits = {
+        'offset_x_px': surface.width,
+        'offset_y_px': surface.height,
+        'pitch_deg': _LARGEST_TILT_DEG,
+        'roll_deg': _LARGEST_TILT_DEG,
+    }
     for key in _NUMBERS:
         value = entry.get(key)
-        if type(value) not in (int, float) or not isfinite(value):
-            raise CameraFileError(f'{key} of {pair} is {value!r}; expected a finite number')
+        limit = limits.get(key, inf)
+        if not is_number(value) or abs(value) > limit:
+            raise CameraFileError(
+                f'{key} of {pair} is {shown(value)}; expected a finite number up to {limit:g}'
+            )
     if type(entry.get('found')) is not bool:
-        raise CameraFileError(f'found of {pair} is {entry.get("found")!r}; expected true or false')
+        found = shown(entry.get('found'))
+        raise CameraFileError(f'found of {pair} is {found}; expected true or false')
     if entry.get('method') not in METHODS:
-        raise CameraFileError(
-            f'method of {pair} is {entry.get("method")!r}; expected one of {", ".join(METHODS)}'
-        )
+        method, methods = shown(entry.get('method')), ', '.join(METHODS)
+        raise CameraFileError(f'method of {pair} is {method}; expected one of {methods}')
+    message = entry.get('message')
     return Overlap(
         method=entry['method'],
         found=entry['found'],
@@ -159,5 +171,5 @@ def _overlap(left: str, right: str, entry: dict) -> Overlap:
         turn=Turn(0.0, radians(entry['pitch_deg']), radians(entry['roll_deg'])),
         overlap_px=float(entry['overlap_px']),
         confidence=float(entry['confidence']),
-        message=str(entry.get('message', '')),
+        message=message if isinstance(message, str) else '',
     )

@@ -1,3 +1,4 @@
+import re
 from dataclasses import replace
 from math import radians
 
@@ -67,9 +68,13 @@ def test_rounding_of_a_calibration_does_not_matter(path):
 @pytest.mark.parametrize(
     ('cameras', 'changes', 'sentence'),
     [
-        (('left', 'right'), {}, 'for the cameras left, middle, right; these are left, right'),
+        (
+            ('left', 'right'),
+            {},
+            "for the cameras 'left', 'middle', 'right'; these are left, right",
+        ),
         (CAMERAS, {'width': 700}, "camera 'left' at width 662; now it is 700"),
-        (CAMERAS, {'kind': 'equirectangular'}, 'at surface cylindrical; now it is equirect'),
+        (CAMERAS, {'kind': 'equirectangular'}, "at surface 'cylindrical'; now it is equirect"),
         (CAMERAS, {'focal_px': 230.0}, 'at focal_px 223.0528; now it is 230'),
     ],
 )
@@ -108,3 +113,11 @@ def test_a_missing_file_is_told(tmp_path):
 
 def test_nothing_but_the_file_is_left_behind(path):
     assert [entry.name for entry in path.parent.iterdir()] == [path.name]
+
+
+def test_what_no_rig_can_have_is_refused(path):
+    good = path.read_text()
+    for key, value in (('offset_x_px', 1e9), ('offset_y_px', -5000), ('roll_deg', 90)):
+        path.write_text(re.sub(f'{key}: [^,}}]*', f'{key}: {value}', good, count=1))
+        with pytest.raises(CameraFileError, match=f'{key} of .*; expected a finite number up to'):
+            read_overlaps(path, CAMERAS, SURFACES)
