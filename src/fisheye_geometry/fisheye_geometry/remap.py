@@ -62,13 +62,13 @@ class _Band(NamedTuple):
     pixels, fractions
         Fixed-point maps as `cv2.convertMaps` gives them.
     fresh
-        Rows of the picture that are needed here and not in the band above.
+        Rows and columns of the picture that are needed here, rows of the band above left out.
     """
 
     rows: slice
     pixels: np.ndarray
     fractions: np.ndarray | None
-    fresh: slice
+    fresh: tuple[slice, slice]
 
 
 class RemapTable:
@@ -101,14 +101,14 @@ class RemapTable:
         self._flag = _INTERPOLATIONS[interpolation]
         self.valid = np.empty((surface.height, surface.width), bool)
         self._bands = []
-        needed = range(0)
+        needed = range(0), range(0)
         step = max(8, round(_BAND_PX / source.width))
         for top in range(0, surface.height, step):
             rows = slice(top, min(top + step, surface.height))
             where, self.valid[rows] = _source_pixels(source, surface, turn, rows)
             nearest = interpolation == 'nearest'
             pixels, fractions = cv2.convertMaps(where, None, cv2.CV_16SC2, nninterpolation=nearest)
-            above, needed = needed, _rows_needed(where[..., 1][self.valid[rows]])
+            above, needed = needed, _needed(where[self.valid[rows]])
             band = _Band(rows, pixels, None if nearest else fractions, _fresh(needed, above))
             self._bands.append(band)
         self.valid.setflags(write=False)
@@ -180,12 +180,20 @@ def _source_pixels(source: Lens | Surface, surface: Surface, turn: Turn, rows: s
     return where.astype(np.float32), seen
 
 
-def _rows_needed(y_px: np.ndarray) -> range:
-    return range(int(y_px.min()), int(y_px.max()) + 2) if y_px.size else range(0)
+def _needed(pixels: np.ndarray) -> tuple[range, range]:
+    """Rows and columns of the picture in which pixels (n, 2) lie."""
+    if not len(pixels):
+        return range(0), range(0)
+    (left, top), (right, bottom) = pixels.min(axis=0).astype(int), pixels.max(axis=0).astype(int)
+    return range(top, bottom + 2), range(left, right + 2)
 
 
-def _fresh(needed: range, above: range) -> slice:
-    """Rows that are needed but were not already above."""
-    if needed.stop > above.stop:
-        return slice(max(needed.start, above.stop), needed.stop)
-    return slice(needed.start, min(needed.stop, above.start))
+def _fresh(needed: tuple[range, range], above: tuple[range, range]) -> tuple[slice, slice]:
+    """Leave out the rows that were needed above."""
+    (rows, columns), (rows_above, _) = needed, above
+    begin, end = rows.start, rows.stop
+    if end > rows_above.stop:
+        begin = max(begin, rows_above.stop)
+    else:
+        end = min(end, rows_above.start)
+    return slice(begin, end), slice(columns.start, columns.stop)

@@ -45,9 +45,9 @@ class GainCompensation:
 
     def __init__(self, layout: Layout, views: Sequence[View], group: Sequence[np.ndarray]):
         """Prepare, and compare a group of pictures (height, width[, channels]), one a camera."""
-        self._pairs = [_Pair(layout, views, i) for i in range(len(layout.seams))]
-        widths = [end - begin for begin, end in map(layout.drawn, range(len(views)))]
         channels = 1 if group[0].ndim == 2 else group[0].shape[2]
+        self._pairs = [_Pair(layout, views, i, channels) for i in range(len(layout.seams))]
+        widths = [end - begin for begin, end in map(layout.drawn, range(len(views)))]
         self._multipliers = [_Multiplier(width, channels) for width in widths]
         self._age = 0
         for pair in self._pairs:
@@ -102,14 +102,14 @@ class _Pair:
         Share of the samples that were clipped in one of the views last time.
     """
 
-    def __init__(self, layout: Layout, views: Sequence[View], index: int):
+    def __init__(self, layout: Layout, views: Sequence[View], index: int, channels: int):
         surface, seam = layout.surface, layout.seams[index]
         left, right = layout.origins[index : index + 2]
         middle, half = sum(seam) / 2, np.radians(_AROUND_SEAM_DEG / 2) * surface.focal_px
         begin = max(right.x_px, middle - half)
         end = min(left.x_px + views[index].surface.width, middle + half)
         self.clipped = 0.0
-        self.log_ratio = np.zeros(1)
+        self.log_ratio = np.zeros(channels)
         self._history: deque[np.ndarray] = deque(maxlen=_MEDIAN_OF)
         self._index = index
         width, height = max(1, round(end - begin)), surface.height
@@ -130,7 +130,7 @@ class _Pair:
         if ratio is None:
             return
         self._history.append(np.log(ratio))
-        aim = np.median(self._history, axis=0)
+        aim = np.sort(self._history, axis=0)[len(self._history) // 2]
         is_first = len(self._history) == 1
         self.log_ratio = aim if is_first else self.log_ratio + _SMOOTHING * (aim - self.log_ratio)
 
@@ -150,7 +150,8 @@ class _Pair:
             return None
         left, right = left.astype(np.float32), right.astype(np.float32)
         ratios = left.sum(axis=0) / np.maximum(right.sum(axis=0), 1)
-        median = np.median(ratios[usable])
+        shown = ratios[usable]
+        median = np.partition(shown, len(shown) // 2)[len(shown) // 2]
         alike = usable & (ratios < median * _ALIKE) & (ratios > median / _ALIKE)
         return (left @ alike) / (right @ alike)
 

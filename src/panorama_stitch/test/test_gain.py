@@ -121,6 +121,18 @@ def test_a_chain_of_cameras_is_evened_out_to_one():
     assert factors == pytest.approx([0.9 / 1.1, 1.0, 0.9 / 1.2], rel=RIGHT)
 
 
+def test_a_camera_that_shows_nothing_is_left_out():
+    offsets = [(np.radians(120) * SURFACE.focal_px, 0.0)] * 2
+    views = [View(LENS, SURFACE)] * 3
+    layout = lay_out(views, offsets, fade_px=8.0, crop='valid')
+    left, middle = (
+        (Scene().view(LENS, Turn(yaw_rad=np.radians(yaw))).frame(0) * exposure).astype(np.uint8)
+        for yaw, exposure in ((-120, 1.1), (0, 0.9))
+    )
+    factors = GainCompensation(layout, views, [left, middle, np.zeros_like(left)]).factors[:, 0]
+    assert factors == pytest.approx([0.9 / 1.1, 1.0, 1.0], rel=RIGHT)
+
+
 def test_without_a_common_scene_nothing_is_changed():
     layout = lay_out(VIEWS, [(float(SURFACE.width), 0.0)], fade_px=8.0, crop='none')
     assert (GainCompensation(layout, VIEWS, pictures(1.0, 1.3)).factors == 1.0).all()
