@@ -45,7 +45,7 @@ class PanoramaOutputSettings(OverlapSettings):
         live=True,
     )
     feather_deg: float = setting(
-        4.0,
+        2.0,
         'Width of the fade at a seam; multiband takes four times as much for coarse detail.',
         minimum=0.1,
         maximum=60.0,
