@@ -5,7 +5,7 @@ import random
 import signal
 import subprocess
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from ament_index_python.packages import get_package_prefix
@@ -91,8 +91,12 @@ class Rig:
         command = [*prefix, str(executable(node)), '--ros-args', '-r', f'__ns:=/{namespace}']
         for name, value in parameters.items():
             command += ['-p', f'{name}:={value}']
-        self._commands[node] = command
-        self.start_again(node)
+        self.run(node, command)
+
+    def run(self, name: str, command: Sequence[str]) -> None:
+        """Start any other process that belongs to the rig."""
+        self._commands[name] = list(command)
+        self.start_again(name)
 
     def start_again(self, node: str) -> None:
         """Start a node that ended, as it was started before."""

@@ -12,10 +12,13 @@ from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
+from fisheye_bridge import shared_memory
 from fisheye_geometry.errors import FisheyeError
 
 _LONGEST_WAIT_S = 0.2
 """A signal is noticed after so long at the latest."""
+_LONGEST_END_S = 1.5
+"""What is still in work so long after it, as a calibration, is left undone."""
 
 
 def run(node_class: type[Node]) -> int:
@@ -36,15 +39,23 @@ def run(node_class: type[Node]) -> int:
     ended = threading.Event()
 
     def end(*_):
+        if ended.is_set():
+            return
         ended.set()
+        guard = threading.Timer(_LONGEST_END_S, os._exit, (0,))
+        guard.daemon = True
+        guard.start()
         if node is None:
             raise KeyboardInterrupt  # it may take seconds until a node is built
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, end)
+    complaint = shared_memory.prepare()
     try:
         # rclpy's own handlers would end the context while threads of the node still publish.
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        if complaint:
+            get_logger(node_class.__name__).warning(complaint)
         node = node_class()
         executor = SingleThreadedExecutor()
         executor.add_node(node)

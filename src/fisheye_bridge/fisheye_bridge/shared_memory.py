@@ -1,0 +1,67 @@
+"""Shared memory, over which Fast DDS exchanges pictures on one machine: enough, and clean."""
+
+import fcntl
+import os
+import time
+from contextlib import suppress
+from pathlib import Path
+
+FOLDER = Path('/dev/shm')
+_PROFILE, _SMALL_PROFILE = 'fastdds.xml', 'fastdds_small.xml'
+_MIB = 1 << 20
+_NEEDED, _NEEDED_SMALL = 72 * _MIB, 12 * _MIB
+"""What a process takes with each of the two profiles, and some room."""
+_VARIABLE = 'FASTRTPS_DEFAULT_PROFILES_FILE'
+_REMEDY = 'in a container: --shm-size=1g'
+_YOUNG_S = 1.0
+"""Whoever makes a lock needs a moment until it is locked."""
+
+
+def prepare(folder: Path = FOLDER) -> str:
+    """Clear what killed processes left and use the profile that fits the room.
+
+    To be called before the first node is made.
+
+    Parameters
+    ----------
+    folder
+        Where shared memory is.
+
+    Returns
+    -------
+    str
+        What is not as it should be; '' if nothing.
+    """
+    if os.environ.get('RMW_IMPLEMENTATION', 'rmw_fastrtps_cpp') != 'rmw_fastrtps_cpp':
+        return ''
+    _clear(folder)
+    room = _room(folder)
+    if room >= _NEEDED:
+        return ''
+    profile = Path(os.environ.get(_VARIABLE, ''))
+    small = profile.with_name(_SMALL_PROFILE) if profile.name == _PROFILE else profile
+    has = f'{folder} has room for {room // _MIB} MiB; expected {_NEEDED // _MIB} for each process'
+    if room >= _NEEDED_SMALL and small.is_file():
+        os.environ[_VARIABLE] = str(small)
+        return f'{has}: pictures of more than 2 million pixels may be lost ({_REMEDY})'
+    return f'{has}: pictures go over UDP, and some may be lost ({_REMEDY})'
+
+
+def _room(folder: Path) -> int:
+    """Give how many bytes can still be taken; 0 where nothing can be written."""
+    try:
+        state = os.statvfs(folder)
+    except OSError:
+        return 0
+    is_writable = not state.f_flag & os.ST_RDONLY and os.access(folder, os.W_OK)
+    return state.f_bavail * state.f_frsize if is_writable else 0
+
+
+def _clear(folder: Path) -> None:
+    """Remove segments whose lock nobody holds: their owners were killed."""
+    for lock in folder.glob('fastrtps_' + '[0-9a-f]' * 16 + '_el'):
+        with suppress(OSError), lock.open('rb') as file:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if time.time() - os.fstat(file.fileno()).st_mtime > _YOUNG_S:
+                lock.with_name(lock.name.removesuffix('_el')).unlink(missing_ok=True)
+                lock.unlink()

@@ -1,0 +1,36 @@
+"""A subscriber as a process of its own: a line with stamp and delay for every image that comes."""
+
+import argparse
+import time
+
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.time import Time
+from sensor_msgs.msg import Image
+
+from fisheye_bridge.qos import IMAGE_INPUT
+
+
+def main() -> None:
+    """Subscribe until a signal comes."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('topic')
+    parser.add_argument('--pause', type=float, default=0.0, help='how long it takes an image, s')
+    arguments = parser.parse_args()
+
+    def take(message):
+        stamp_ns = Time.from_msg(message.header.stamp).nanoseconds
+        print(stamp_ns, f'{(time.time_ns() - stamp_ns) / 1e6:.1f}', flush=True)
+        time.sleep(arguments.pause)
+
+    try:
+        rclpy.init()
+        node = rclpy.create_node('subscriber')
+        node.create_subscription(Image, arguments.topic, take, IMAGE_INPUT)
+        rclpy.spin(node)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+
+
+if __name__ == '__main__':
+    main()
