@@ -205,7 +205,7 @@ class _Measurement:
     def _not_found(self, method, found) -> Overlap:
         needed = self._settings.min_confidence
         message = f'no common scene: confidence {found.confidence:.2f}, {needed:.2f} is needed'
-        if found.fit >= needed:
+        if found.rival_fit >= needed:
             here, there = (self._where(x) for x in (found.pose.x_px, found.rival_x_px))
             message = (
                 f'the scene repeats itself: {here} and {there} fit alike; set expected_yaw_deg or '

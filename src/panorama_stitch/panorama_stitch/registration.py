@@ -64,10 +64,8 @@ class Registration:
         px of the halves.
     fit
         Correlation of the structure of the overlap, less what chance may give; 0 to 1.
-    distinct
-        0 to 1: how far any other offset is from fitting as well.
-    rival_x_px
-        The other offset that fits best.
+    rival_fit, rival_x_px
+        The fit of the best other offset, and where that is.
     proposals
         The particles that proposed it, px of the halves; None where the full search did.
     match
@@ -76,10 +74,18 @@ class Registration:
 
     pose: Pose
     fit: float = 0.0
-    distinct: float = 0.0
+    rival_fit: float = 0.0
     rival_x_px: float = 0.0
     proposals: Proposals | None = None
     match: tuple[int, int] = (-1, -1)
+
+    @property
+    def distinct(self) -> float:
+        """0 to 1: how far any other offset is from fitting as well."""
+        less_unexplained = (1 - self.rival_fit) / max(1 - self.fit, 1e-6)
+        by_ratio = (less_unexplained - 1) / (_DISTINCT_RATIO - 1)
+        by_margin = (self.fit - self.rival_fit) / _DISTINCT_MARGIN
+        return min(max(min(by_ratio, by_margin), 0.0), 1.0)
 
     @property
     def confidence(self) -> float:
@@ -190,10 +196,7 @@ def _verify(
     fit, pose = max(verified, key=itemgetter(0))
     rivals = [landscape.best_away_from(pose.x_px, apart)]
     rivals += [(other, one.x_px) for other, one in verified if abs(one.x_px - pose.x_px) > apart]
-    rival, rival_x_px = max(rivals)
-    less_unexplained = (1 - rival) / max(1 - fit, 1e-6)
-    shares = (less_unexplained - 1) / (_DISTINCT_RATIO - 1), (fit - rival) / _DISTINCT_MARGIN
-    return Registration(pose, fit, float(np.clip(min(shares), 0, 1)), rival_x_px)
+    return Registration(pose, fit, *max(rivals))
 
 
 def _align(facing: Facing, level: Pose, tilt: bool) -> tuple[float, Pose]:

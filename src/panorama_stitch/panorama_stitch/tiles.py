@@ -15,6 +15,8 @@ _SHORTEST_REACH_PX = 4
 _COLUMNS, _ROWS = 4, 18
 """At most so many tiles across and down the overlap."""
 _SEEN_SHARE = 0.8
+_FAINTEST = 0.01
+"""Structure below it is rounding."""
 _LIKELY_TILT_RAD = radians(1.5)
 _LIKELY_RISE_RAD = radians(0.2)
 """How far mounts are usually off: what decides where the overlap does not."""
@@ -171,10 +173,11 @@ def _correlate(fit, known, facing, origin, corner, size):
     """Fill in one tile's map: its correlation with each place of the left picture, if all seen."""
     (x0, y0), (x1, y1) = np.maximum(corner, 0), np.maximum(corner + len(fit) - 1 + size, 0)
     window = facing.left.image[y0:y1, x0:x1]
-    if min(window.shape) < size:
-        return
     x, y = origin
     tile = facing.right.image[y : y + size, x : x + size]
+    # Of an empty tile, OpenCV says that it fits everywhere.
+    if min(window.shape) < size or cv2.norm(tile, cv2.NORM_INF) < _FAINTEST:
+        return
     responses = cv2.matchTemplate(window, tile, cv2.TM_CCOEFF_NORMED)
     seen = _box_sums(facing.left.valid[y0:y1, x0:x1], size) == size * size
     column, row = (x0, y0) - corner

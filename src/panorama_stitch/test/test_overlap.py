@@ -251,7 +251,7 @@ class TestInput:
     def test_a_picture_that_holds_no_overlap(self, town):
         (surface, _) = town[1]
         tiny = np.zeros((surface.height, 31), np.uint8)
-        with pytest.raises(OverlapError, match='31x.* is too small'):
+        with pytest.raises(OverlapError, match=r'31x.* is too small'):
             measure((tiny, tiny), (replace(surface, width=31),) * 2)
 
     def test_an_unknown_method(self, town):
