@@ -93,7 +93,8 @@ def test_what_killed_processes_leave_stops_nobody(rig):
                     del rig.processes[name]
         left = len(segments())
         print(
-            f'\nfive nodes killed {ROUNDS} times: {left} of {6 * ROUNDS} segments of shared memory are left'
+            f'\nfive nodes killed {ROUNDS} times: '
+            f'{left} of {6 * ROUNDS} segments of shared memory are left'
         )
         assert left <= len(SEPARATE) + 1
 
