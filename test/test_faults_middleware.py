@@ -115,8 +115,9 @@ def test_a_starved_subscriber_starves_nobody_else(five, how):
         try:
             if how == 'frozen':
                 os.kill(five.processes['starved'].pid, signal.SIGSTOP)
-            before = usage(stitch)
             came = watched(five.health)
+            before = usage(stitch)  # by now a reader more has its buffers
+            watched(five.health)
             grown = usage(stitch).resident_mib - before.resident_mib
         finally:
             os.kill(five.processes['starved'].pid, signal.SIGCONT)

@@ -25,7 +25,12 @@ SCHEDULING = 0.2
 def start(rig, watcher, *, composed=False, folder=None, **capture):
     rig.start_all(composed, camera_parameters(folder), frame_rate_hz=RATE_HZ, **capture)
     wait_for(lambda: rig.check_alive() or watcher.newest, START_S, 'a first panorama')
-    wait_for(lambda: watcher.overlaps and watcher.projection, START_S, 'the latched topics')
+    wait_for(lambda: watcher.projection and is_measured(watcher), START_S, 'the latched topics')
+
+
+def is_measured(watcher):
+    """Tell whether the overlap was looked for; a camera that is alone for a while is shown too."""
+    return watcher.overlaps and all(overlap.method for overlap in watcher.overlaps.overlaps)
 
 
 def captured_stamps(watcher):
