@@ -103,6 +103,7 @@ def summary(size, interpolation: str, threads: int, megapixels: float, times) ->
 def prepare(size: tuple[int, int], interpolation: str) -> tuple[dict[str, Callable], float]:
     """Give functions that compose a pair in every way, and the megapixels of a panorama."""
     equal, unlike = synthetic_pair(*size), synthetic_pair(*size, UNLIKE)
+    # Each way has pictures of its own: they come from memory, as those of a camera do.
     ways = {}
     for blend in BLENDS:
         ways[blend], _ = composing(equal, blend, interpolation, gain=False)
@@ -130,7 +131,13 @@ def composing(pair: Pair, blend: str, interpolation: str, gain: bool):
     compositor = compositor_of(pair, blend, interpolation, gain)
     surface = compositor.layout.surface
     out = np.empty((surface.height, surface.width, 3), np.uint8)
-    return lambda: compositor.compose(pair.images, out), out
+    images = own(pair)
+    return lambda: compositor.compose(images, out), out
+
+
+def own(pair: Pair) -> list[np.ndarray]:
+    """Give copies of a pair's pictures."""
+    return [image.copy() for image in pair.images]
 
 
 def floor(pair: Pair, surfaces: list[Surface], interpolation: str) -> Callable[[], None]:
@@ -140,9 +147,10 @@ def floor(pair: Pair, surfaces: list[Surface], interpolation: str) -> Callable[[
         for lens, surface in zip(pair.lenses, surfaces, strict=True)
     ]
     outs = [np.empty((surface.height, surface.width, 3), np.uint8) for surface in surfaces]
+    images = own(pair)
 
     def correct():
-        for image, table, out in zip(pair.images, tables, outs, strict=True):
+        for image, table, out in zip(images, tables, outs, strict=True):
             cv2.remap(image, *table, FLAGS[interpolation], dst=out)
 
     return correct
@@ -171,11 +179,12 @@ def naive(pair: Pair, surfaces, layout: Layout, interpolation: str, out: np.ndar
         for i, (lens, surface) in enumerate(zip(pair.lenses, surfaces, strict=True))
     ]
     right = np.empty((len(out), out.shape[1] - begin, 3), np.uint8)
+    images = own(pair)
     ramp = np.tile((np.arange(end - begin, dtype=np.float32) + 0.5) / (end - begin), (len(out), 1))
 
     def compose():
-        cv2.remap(pair.images[0], *tables[0], FLAGS[interpolation], dst=out[:, :end])
-        cv2.remap(pair.images[1], *tables[1], FLAGS[interpolation], dst=right)
+        cv2.remap(images[0], *tables[0], FLAGS[interpolation], dst=out[:, :end])
+        cv2.remap(images[1], *tables[1], FLAGS[interpolation], dst=right)
         strip = out[:, begin:end]
         cv2.blendLinear(strip, right[:, : end - begin], 1 - ramp, ramp, dst=strip)
         out[:, end:] = right[:, end - begin :]

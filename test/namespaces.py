@@ -1,6 +1,7 @@
 """Linux namespaces in which processes are run: another /dev/shm, another network."""
 
 import subprocess
+from contextlib import suppress
 
 import pytest
 
@@ -37,3 +38,46 @@ class Namespace:
     def __exit__(self, *_) -> None:
         self._holder.kill()
         self._holder.communicate()
+
+
+class Link:
+    """A cable between two machines, each with a network and shared memory of its own.
+
+    Attributes
+    ----------
+    robot, base : Namespace
+        The two machines.
+    """
+
+    _DEVICE = 'link0'
+
+    def __init__(self):
+        kinds = 'mount', 'net'
+        prepare = 'mount -t tmpfs tmpfs /dev/shm && ip link set lo up'
+        self.robot, self.base = Namespace(kinds, prepare), Namespace(kinds, prepare)
+        ends = [('name', self._DEVICE, 'netns', str(end.pid)) for end in (self.robot, self.base)]
+        self._ip('link', 'add', *ends[0], 'type', 'veth', 'peer', *ends[1])
+        for number, end in enumerate((self.robot, self.base), 1):
+            address = f'10.77.0.{number}/24'
+            self._ip('address', 'add', address, 'dev', self._DEVICE, prefix=end.prefix)
+            self._ip('link', 'set', self._DEVICE, 'up', prefix=end.prefix)
+
+    def __enter__(self) -> 'Link':
+        return self
+
+    def __exit__(self, *_) -> None:
+        with suppress(subprocess.CalledProcessError):
+            self._ip('link', 'delete', self._DEVICE, prefix=self.robot.prefix)
+        self.robot.__exit__()
+        self.base.__exit__()
+
+    def cut(self) -> None:
+        """Pull the cable."""
+        self._ip('link', 'set', self._DEVICE, 'down', prefix=self.robot.prefix)
+
+    def mend(self) -> None:
+        """Plug it in again."""
+        self._ip('link', 'set', self._DEVICE, 'up', prefix=self.robot.prefix)
+
+    def _ip(self, *words, prefix=()) -> None:
+        subprocess.run([*prefix, 'ip', *words], check=True)

@@ -8,7 +8,7 @@ import time
 
 import pytest
 from rclpy.time import Time
-from rig import COMPOSED, SEPARATE, camera_parameters, wait_for
+from rig import COMPOSED, SEPARATE, SIDES, camera_parameters, wait_for
 from sensor_msgs.msg import CameraInfo, CompressedImage
 
 from fisheye_bridge.camera_info import camera_of
@@ -127,6 +127,18 @@ def test_what_a_teleoperation_stack_needs_is_there(rig, watcher):
     assert taken['left/camera_info'].header.frame_id == 'left_optical_frame'
     assert taken['panorama/image/compressed'].format == 'bgr8; jpeg compressed bgr8'
     assert taken['panorama/image/compressed'].header.frame_id == 'panorama_optical_frame'
+
+
+@pytest.mark.parametrize('transport', ['raw', 'compressed'])
+def test_the_one_node_takes_cameras_that_other_nodes_read(rig, watcher, transport):
+    for side in SIDES:
+        rig.start(f'{side}/capture')
+    rig.start('panorama', transport=transport, **{f'{side}.source': 'topic' for side in SIDES})
+    wait_for(lambda: rig.check_alive() or is_measured(watcher), START_S, 'an overlap')
+    (overlap,) = watcher.overlaps.overlaps
+    assert overlap.offset_deg == pytest.approx(140, abs=0.5)
+    taken = [watcher.node.count_subscribers(f'left/image_raw{end}') for end in ('', '/compressed')]
+    assert taken == ([1, 0] if transport == 'raw' else [0, 1])
 
 
 @pytest.mark.parametrize('with_signal', [signal.SIGINT, signal.SIGTERM])

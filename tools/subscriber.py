@@ -1,4 +1,4 @@
-"""A subscriber as a process of its own: a line with stamp and delay for every image that comes."""
+"""A subscriber as a process of its own: a line with stamp and delay for each message that comes."""
 
 import argparse
 import time
@@ -6,16 +6,19 @@ import time
 import rclpy
 from rclpy.executors import ExternalShutdownException
 from rclpy.time import Time
-from sensor_msgs.msg import Image
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
 from fisheye_bridge.qos import IMAGE_INPUT
+
+KINDS = {kind.__name__: kind for kind in (Image, CompressedImage, CameraInfo)}
 
 
 def main() -> None:
     """Subscribe until a signal comes."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('topic')
-    parser.add_argument('--pause', type=float, default=0.0, help='how long it takes an image, s')
+    parser.add_argument('--kind', choices=KINDS, default='Image')
+    parser.add_argument('--pause', type=float, default=0.0, help='how long it takes each, s')
     arguments = parser.parse_args()
 
     def take(message):
@@ -26,7 +29,7 @@ def main() -> None:
     try:
         rclpy.init()
         node = rclpy.create_node('subscriber')
-        node.create_subscription(Image, arguments.topic, take, IMAGE_INPUT)
+        node.create_subscription(KINDS[arguments.kind], arguments.topic, take, IMAGE_INPUT)
         rclpy.spin(node)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass

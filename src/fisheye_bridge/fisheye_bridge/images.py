@@ -8,14 +8,12 @@ import numpy as np
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
-from fisheye_bridge.picture_head import size_of
+from fisheye_geometry.coded_picture import decoded
 from fisheye_geometry.errors import ImageFormatError
 from fisheye_geometry.lens import MAX_PICTURE_SIDE_PX
 
 CHANNELS = {'bgr8': 3, 'rgb8': 3, 'mono8': 1}
 """The encodings that the nodes work in and publish."""
-_MAX_PIXELS = 50_000_000
-"""Of a coded picture: a few bytes can claim to be more than fits into memory."""
 
 
 @dataclass(frozen=True)
@@ -149,6 +147,11 @@ def to_jpeg(image: np.ndarray, encoding: str, header: Header, quality: int) -> C
     if encoding == 'rgb8':
         image = cv2.cvtColor(image, cv2.COLOR_RGB2BGR)
     _, coded = cv2.imencode('.jpg', image, (cv2.IMWRITE_JPEG_QUALITY, quality))
+    return jpeg_message(coded, encoding, header)
+
+
+def jpeg_message(coded: np.ndarray, encoding: str, header: Header) -> CompressedImage:
+    """Give the same for a picture that is a JPEG already, (n,) uint8."""
     stored = '' if encoding == 'mono8' else 'bgr8'
     message = CompressedImage(header=header, format=f'{encoding}; jpeg compressed {stored}')
     data = array('B')
@@ -165,20 +168,8 @@ def from_jpeg(message: CompressedImage) -> tuple[np.ndarray, str]:
     ImageFormatError
         If the data is no picture, or one that is too large.
     """
-    coded = np.frombuffer(message.data, np.uint8)
-    width, height = size_of(coded)
-    if not 1 <= width * height <= _MAX_PIXELS:
-        raise ImageFormatError(
-            f'a picture of {width}x{height} px; expected up to {_MAX_PIXELS / 1e6:g} million px'
-        )
     grey = message.format.startswith('mono8')
-    flag = cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR
-    try:
-        image = cv2.imdecode(coded, flag)
-    except cv2.error:
-        image = None
-    if image is None:
-        raise ImageFormatError(f'a broken picture of {width}x{height} px ({coded.size} bytes)')
+    image = decoded(np.frombuffer(message.data, np.uint8), grey=grey)
     return image, 'mono8' if grey else 'bgr8'
 
 

@@ -1,6 +1,7 @@
 """Image topics: the raw picture and beside it the JPEG that image_transport would publish."""
 
 from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 from rclpy.callback_groups import CallbackGroup
@@ -8,7 +9,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
-from fisheye_bridge.images import from_jpeg, to_array, to_jpeg
+from fisheye_bridge.images import ImageBuffer, from_jpeg, jpeg_message, to_array, to_jpeg
 from fisheye_bridge.qos import ADJUSTABLE, IMAGE, IMAGE_INPUT
 from fisheye_geometry.errors import FisheyeError
 
@@ -17,12 +18,24 @@ WARNING_PAUSE_S = 5.0
 """Between two warnings of the same kind."""
 
 
+class Picture(Protocol):
+    """What a camera gives."""
+
+    size: tuple[int, int]
+    """Width and height, px."""
+    image: np.ndarray
+    """(height, width[, 3]) uint8; possibly decoded only now."""
+    jpeg: np.ndarray | None
+    """(n,) uint8; None if the camera gave pixels."""
+
+
 class ImagePublisher:
     """Publishes a picture raw and, on the `compressed` sub-topic, as JPEG; each only if wanted."""
 
     def __init__(self, node: Node, topic: str):
         self._raw = node.create_publisher(Image, topic, IMAGE)
         self._jpeg = node.create_publisher(CompressedImage, f'{topic}/compressed', IMAGE)
+        self._buffer: ImageBuffer | None = None
 
     @property
     def wanted(self) -> bool:
@@ -35,6 +48,30 @@ class ImagePublisher:
             self._raw.publish(message)
         if self._jpeg.get_subscription_count():
             self._jpeg.publish(to_jpeg(image, message.encoding, message.header, jpeg_quality))
+
+    def publish_picture(
+        self, picture: Picture, encoding: str, header: Header, jpeg_quality: int
+    ) -> None:
+        """Publish a camera's picture, its JPEG as it is where the camera gave one.
+
+        Raises
+        ------
+        ImageFormatError
+            If its pixels are wanted and broken.
+        """
+        if self._raw.get_subscription_count():
+            width, height = picture.size
+            if self._buffer is None or not self._buffer.fits(width, height, encoding):
+                self._buffer = ImageBuffer(width, height, encoding)
+            np.copyto(self._buffer.array, picture.image)
+            self._buffer.message.header = header
+            self._raw.publish(self._buffer.message)
+        if self._jpeg.get_subscription_count():
+            if picture.jpeg is None:
+                message = to_jpeg(picture.image, encoding, header, jpeg_quality)
+            else:
+                message = jpeg_message(picture.jpeg, encoding, header)
+            self._jpeg.publish(message)
 
 
 class ImageSubscription:

@@ -1,6 +1,5 @@
 """One camera as a node: its pictures, and beside each what the camera sees."""
 
-import numpy as np
 from rclpy.node import Node
 from rclpy.time import Time
 from sensor_msgs.msg import CameraInfo
@@ -9,16 +8,15 @@ from std_msgs.msg import Header
 
 from fisheye_bridge.camera_info import camera_info_of, camera_of
 from fisheye_bridge.diagnostics import ERROR, WARN, Diagnostics, Shedding
-from fisheye_bridge.images import ImageBuffer
 from fisheye_bridge.parameters import Parameters
 from fisheye_bridge.qos import IMAGE
 from fisheye_bridge.running import run
-from fisheye_bridge.topics import ImagePublisher
+from fisheye_bridge.topics import WARNING_PAUSE_S, ImagePublisher
 from fisheye_capture.calibration_url import calibration_path
 from fisheye_capture.grabber import Grabber
 from fisheye_capture.newest import Newest
 from fisheye_capture.settings import CaptureSettings
-from fisheye_capture.source import Frame
+from fisheye_capture.source import Frame, JpegFrame
 from fisheye_geometry.camera_file import Camera, read_camera, write_camera
 from fisheye_geometry.errors import CameraFileError, FisheyeError
 
@@ -34,8 +32,8 @@ class CaptureNode(Node):
         self._calibration_path = calibration_path(self._settings.camera_info_url)
         self._image = ImagePublisher(self, 'image_raw')
         self._camera_info = self.create_publisher(CameraInfo, 'camera_info', IMAGE)
-        self._buffer: ImageBuffer | None = None
         self._info, self._described, self._fault = CameraInfo(), None, ''
+        self._broken = 0
         self._publishing = Newest(self._publish, 'publish')
         self._shedding = Shedding('pictures')
         self._grabber = Grabber(self._settings, self._publishing.put, on_change=self._tell)
@@ -62,19 +60,20 @@ class CaptureNode(Node):
             return None
         return read_camera(path)
 
-    def _publish(self, frame: Frame) -> None:
-        image, encoding = frame.image, self._settings.encoding
-        height, width = image.shape[:2]
+    def _publish(self, frame: Frame | JpegFrame) -> None:
+        settings = self._declared.settings
         stamp = Time(nanoseconds=frame.stamp_ns).to_msg()
         header = Header(stamp=stamp, frame_id=self._settings.frame_id)
-        if self._described != (self._camera, width, height):
-            self._describe(self._camera, width, height)
-        if self._image.wanted:
-            if self._buffer is None or not self._buffer.fits(width, height, encoding):
-                self._buffer = ImageBuffer(width, height, encoding)
-            np.copyto(self._buffer.array, image)
-            self._buffer.message.header = header
-            self._image.publish(self._buffer.message, image, self._declared.settings.jpeg_quality)
+        if self._described != (self._camera, *frame.size):
+            self._describe(self._camera, *frame.size)
+        try:
+            self._image.publish_picture(frame, settings.encoding, header, settings.jpeg_quality)
+        except FisheyeError as error:
+            self._broken += 1
+            self.get_logger().warning(
+                f'a picture was dropped: {error}', throttle_duration_sec=WARNING_PAUSE_S
+            )
+            return
         self._info.header = header
         self._camera_info.publish(self._info)
 
@@ -130,6 +129,7 @@ class CaptureNode(Node):
         skipped = grabber.skipped + self._publishing.dropped
         self._shedding.tell(report, grabber.frames, skipped)
         report.values['pictures skipped'] = skipped
+        report.values['pictures broken'] = self._broken
 
 
 def main() -> int:

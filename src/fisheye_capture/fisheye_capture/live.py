@@ -6,8 +6,16 @@ import time
 import cv2
 
 from fisheye_capture.settings import CaptureSettings
-from fisheye_capture.source import Frame, Source, SourceEndedError, SourceLostError, encoded
-from fisheye_geometry.errors import SourceError
+from fisheye_capture.source import (
+    Frame,
+    JpegFrame,
+    Source,
+    SourceEndedError,
+    SourceLostError,
+    encoded,
+)
+from fisheye_geometry.coded_picture import size_of, whole_jpeg
+from fisheye_geometry.errors import ImageFormatError, SourceError
 
 _BROKEN_IN_A_ROW = 10
 """So many broken pictures one after the other are a broken camera."""
@@ -27,16 +35,17 @@ class LiveSource(Source):
         self._name = name
         self._capture = capture
         self._encoding = encoding
-        self._shape = None
+        self._size = None
 
-    def read(self) -> Frame:
+    def read(self) -> Frame | JpegFrame:
         """Wait for the next frame; skips a few broken ones."""
         for _ in range(_BROKEN_IN_A_ROW):
             self._grab()
             stamp_ns = time.time_ns()
             image = self._retrieve()
-            if image is not None:
-                return Frame(stamp_ns, encoded(self._checked(image), self._encoding))
+            frame = None if image is None else self._frame(stamp_ns, image)
+            if frame is not None:
+                return self._checked(frame)
         raise SourceLostError(f'{self._name} gives only broken pictures')
 
     def close(self) -> None:
@@ -54,16 +63,20 @@ class LiveSource(Source):
             return None
         return image if is_whole and image is not None and image.size else None
 
-    def _checked(self, image):
+    def _frame(self, stamp_ns, image):
+        """Make a frame of what OpenCV gave; None if it is broken."""
+        return Frame(stamp_ns, encoded(image, self._encoding))
+
+    def _checked(self, frame):
         """Refuse a picture of another size: the calibration holds for one only."""
-        self._shape = self._shape or image.shape
-        if image.shape != self._shape:
-            height, width = self._shape[:2]
+        self._size = self._size or frame.size
+        if frame.size != self._size:
             raise SourceLostError(
-                f'{self._name} changed its size from {width}x{height} px '
-                f'to {image.shape[1]}x{image.shape[0]} px'
+                '{} changed its size from {}x{} px to {}x{} px'.format(
+                    self._name, *self._size, *frame.size
+                )
             )
-        return image
+        return frame
 
 
 class DeviceSource(LiveSource):
@@ -115,7 +128,22 @@ class DeviceSource(LiveSource):
         fourcc = code.to_bytes(4, 'little').decode('latin-1')
         if pixel_format and fourcc != pixel_format:
             differing.append(f'{fourcc} instead of {pixel_format}')
+        if fourcc == 'MJPG' and settings.encoding != 'mono8':
+            # Its own JPEG, to be passed on as it is; in grey it would be another picture.
+            capture.set(cv2.CAP_PROP_CONVERT_RGB, 0)
         return f'{self._name} gives ' + ', '.join(differing) if differing else ''
+
+    def _frame(self, stamp_ns, image):
+        is_coded = image.ndim == 2 and image.shape[0] == 1
+        if not is_coded:
+            return super()._frame(stamp_ns, image)
+        jpeg = whole_jpeg(image[0])
+        if jpeg is None:
+            return None
+        try:
+            return JpegFrame(stamp_ns, jpeg, size_of(jpeg), self._encoding)
+        except ImageFormatError:
+            return None
 
     def _grab(self):
         deadline_s = time.monotonic() + _PATIENCE_S

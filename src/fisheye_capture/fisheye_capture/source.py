@@ -1,12 +1,14 @@
 """What every source of pictures is: something that gives the next frame until it is lost."""
 
 from abc import ABC, abstractmethod
-from typing import NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
 
 from fisheye_geometry.camera_file import Camera
+from fisheye_geometry.coded_picture import decoded
 from fisheye_geometry.errors import SourceError
 
 
@@ -18,7 +20,8 @@ class SourceEndedError(SourceError):
     """The last picture was given, and no more are wanted."""
 
 
-class Frame(NamedTuple):
+@dataclass(frozen=True)
+class Frame:
     """A picture and when it was taken.
 
     Attributes
@@ -27,10 +30,34 @@ class Frame(NamedTuple):
         Time since the epoch.
     image
         (height, width, 3) or, as mono8, (height, width) uint8; possibly read-only.
+    jpeg
+        As the camera itself coded it, (n,) uint8; None where it gave pixels.
     """
 
     stamp_ns: int
     image: np.ndarray
+    jpeg = None
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height, px."""
+        height, width = self.image.shape[:2]
+        return width, height
+
+
+@dataclass(frozen=True)
+class JpegFrame:
+    """A `Frame` that the camera coded: decoded only where its pixels are wanted."""
+
+    stamp_ns: int
+    jpeg: np.ndarray
+    size: tuple[int, int]
+    encoding: str
+
+    @cached_property
+    def image(self) -> np.ndarray:
+        """Pixels in the wanted encoding; raises an `ImageFormatError` if they are broken."""
+        return encoded(decoded(self.jpeg), self.encoding)
 
 
 class Source(ABC):
@@ -51,7 +78,7 @@ class Source(ABC):
     skipped: int = 0
 
     @abstractmethod
-    def read(self) -> Frame:
+    def read(self) -> Frame | JpegFrame:
         """Wait for the next frame.
 
         Raises

@@ -49,9 +49,10 @@ def main() -> None:
         try:
             source = open_stream(url, encoding, float(frame_rate_hz))
             while True:
-                stamp_ns, image = source.read()
+                frame = source.read()
+                image = frame.image
                 channels = 1 if image.ndim == 2 else image.shape[2]
-                pipe.write(HEADER.pack(stamp_ns, *image.shape[:2], channels))
+                pipe.write(HEADER.pack(frame.stamp_ns, *image.shape[:2], channels))
                 pipe.write(image)
                 pipe.flush()
         except SourceError as error:

@@ -1,5 +1,9 @@
 """The capture node in this process, heard by a node beside it."""
 
+import tempfile
+import time
+
+import cv2
 import numpy as np
 import pytest
 import rclpy
@@ -14,6 +18,7 @@ from std_msgs.msg import Header
 from fisheye_bridge.camera_info import camera_info_of, camera_of
 from fisheye_bridge.images import from_jpeg, to_array
 from fisheye_bridge.qos import IMAGE
+from fisheye_capture import live, source
 from fisheye_capture.capture_node import CaptureNode
 from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.camera_file import Camera, read_camera, write_camera
@@ -28,7 +33,7 @@ class Ear(Node):
 
     def __init__(self, context):
         super().__init__('ear', context=context)
-        self.heard = {}
+        self.heard, self.topics = {}, {}
         for kind, topic in (
             (Image, '/left/image_raw'),
             (CameraInfo, '/left/camera_info'),
@@ -37,7 +42,7 @@ class Ear(Node):
             self.listen(kind, topic)
 
     def listen(self, kind, topic):
-        self.create_subscription(
+        self.topics[topic] = self.create_subscription(
             kind, topic, lambda message: self.heard.update({topic: message}), IMAGE
         )
 
@@ -119,6 +124,76 @@ def test_the_picture_is_the_one_of_the_file_also_as_jpeg(ros, write_picture):
     packed = ros.hear(topic)
     assert packed.format == 'mono8; jpeg compressed '
     assert from_jpeg(packed)[0].shape == (24, 32)
+
+
+class JpegDevice:
+    """A `cv2.VideoCapture` of a camera that codes its pictures itself."""
+
+    picture = cv2.imencode('.jpg', np.full((24, 32, 3), 90, np.uint8))[1].ravel()
+
+    def isOpened(self):  # noqa: N802
+        return True
+
+    def set(self, prop, value):
+        return True
+
+    def get(self, prop):
+        return {cv2.CAP_PROP_FOURCC: cv2.VideoWriter_fourcc(*'MJPG'), cv2.CAP_PROP_FPS: 30}.get(
+            prop, 0
+        )
+
+    def grab(self):
+        time.sleep(0.02)
+        return True
+
+    def retrieve(self):
+        return True, self.picture[None]
+
+    def release(self):
+        pass
+
+
+@pytest.fixture
+def jpeg_device(monkeypatch):
+    """Give the path of a device that is there, and whose capture is replaced."""
+    monkeypatch.setattr(live.cv2, 'VideoCapture', lambda *arguments: JpegDevice())
+    with tempfile.NamedTemporaryFile(dir='/dev/shm') as file:
+        yield file.name
+
+
+def test_the_jpeg_of_a_device_is_passed_on_as_it_is(ros, jpeg_device, monkeypatch):
+    def never(*arguments):
+        raise AssertionError('the picture was decoded')
+
+    topic = '/left/image_raw/compressed'
+    ros.ear.destroy_subscription(ros.ear.topics['/left/image_raw'])
+    ros.ear.listen(CompressedImage, topic)
+    monkeypatch.setattr(source, 'decoded', never)
+    ros.start(source=jpeg_device)
+    message = ros.hear(topic)
+    assert bytes(message.data) == JpegDevice.picture.tobytes()
+    assert message.format == 'bgr8; jpeg compressed bgr8'
+    assert ros.hear('/left/camera_info').width == 32
+    monkeypatch.undo()
+
+
+def test_the_jpeg_of_a_device_is_decoded_for_those_who_want_pixels(ros, jpeg_device):
+    ros.start(source=jpeg_device)
+    image, encoding = to_array(ros.hear('/left/image_raw'))
+    assert (encoding, image.shape, image[0, 0, 0]) == ('bgr8', (24, 32, 3), 90)
+
+
+def test_a_picture_that_cannot_be_decoded_is_dropped_and_counted(ros, jpeg_device, monkeypatch):
+    head_only = np.append(JpegDevice.picture[:200], JpegDevice.picture[-2:])
+    monkeypatch.setattr(JpegDevice, 'picture', head_only)
+    ros.start(source=jpeg_device)
+
+    def broken():
+        values = {entry.key: entry.value for entry in ros.hear('/diagnostics').status[0].values}
+        return int(values['pictures broken'])
+
+    ros.spin_until(broken, 'a broken picture')
+    assert '/left/image_raw' not in ros.ear.heard
 
 
 def test_without_a_calibration_k_is_zero_and_it_is_said(ros, write_picture):

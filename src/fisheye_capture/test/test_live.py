@@ -47,6 +47,19 @@ class Capture:
         self.is_released = True
 
 
+class JpegCapture(Capture):
+    """Gives what the camera coded when it is told not to convert, as Video4Linux does."""
+
+    def retrieve(self):
+        is_whole, jpeg = super().retrieve()
+        if self._values.get(cv2.CAP_PROP_CONVERT_RGB, 1):
+            return is_whole, cv2.imdecode(jpeg, cv2.IMREAD_COLOR)
+        return is_whole, jpeg[None]
+
+
+JPEG = cv2.imencode('.jpg', GOOD[1])[1].ravel()
+
+
 @pytest.fixture
 def open_device(monkeypatch, settings, tmp_path):
     """Open a device whose capture is replaced; its path is there."""
@@ -63,11 +76,13 @@ def open_device(monkeypatch, settings, tmp_path):
 def test_the_format_is_asked_for_before_the_size(open_device):
     capture = Capture()
     device = open_device(capture, width=800, height=600, frame_rate_hz=30.0)
-    assert [prop for prop in capture.asked if prop != cv2.CAP_PROP_BUFFERSIZE] == [
+    asked = [prop for prop in capture.asked if prop != cv2.CAP_PROP_BUFFERSIZE]
+    assert asked == [
         cv2.CAP_PROP_FOURCC,
         cv2.CAP_PROP_FRAME_WIDTH,
         cv2.CAP_PROP_FRAME_HEIGHT,
         cv2.CAP_PROP_FPS,
+        cv2.CAP_PROP_CONVERT_RGB,
     ]
     assert capture.get(cv2.CAP_PROP_FOURCC) == cv2.VideoWriter_fourcc(*'MJPG')
     assert device.note == ''
@@ -150,4 +165,28 @@ def test_an_interrupted_device_ends(open_device):
     device = open_device(Capture([GOOD]))
     device.interrupt()
     with pytest.raises(SourceEndedError):
+        device.read()
+
+
+def test_the_jpeg_of_a_device_is_kept_and_decoded_only_when_it_is_wanted(open_device):
+    torn = JPEG[:-20]
+    noise = np.arange(200, dtype=np.uint8)
+    answers = [(True, picture) for picture in (torn, noise, np.append(JPEG, noise * 0))]
+    frame = open_device(JpegCapture(answers), encoding='rgb8').read()
+    np.testing.assert_array_equal(frame.jpeg, JPEG)
+    assert frame.size == (32, 24)
+    assert 'image' not in vars(frame)
+    assert frame.image.shape == (24, 32, 3)
+
+
+def test_a_grey_picture_is_no_jpeg_of_the_device(open_device):
+    frame = open_device(JpegCapture([(True, JPEG)]), encoding='mono8').read()
+    assert (frame.jpeg, frame.image.shape) == (None, (24, 32))
+
+
+def test_a_device_whose_jpeg_changes_its_size_is_lost(open_device):
+    larger = cv2.imencode('.jpg', np.zeros((48, 64, 3), np.uint8))[1].ravel()
+    device = open_device(JpegCapture([(True, JPEG), (True, larger)]))
+    device.read()
+    with pytest.raises(SourceLostError, match='changed its size from 32x24 px to 64x48 px'):
         device.read()

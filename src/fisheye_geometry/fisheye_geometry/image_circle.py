@@ -58,3 +58,26 @@ class ImageCircle:
         self._found = self._found or bool(is_circle)
         self.angle_rad = float(min(angle, self._lens.max_angle_rad))
         return True
+
+
+class SeenLens:
+    """A lens as far as its light reaches in the pictures that came.
+
+    The circle does not change: it is looked for in the first picture, the second, the fourth, ...
+    """
+
+    def __init__(self, lens: Lens):
+        self._lens = lens
+        self._circle = ImageCircle(lens)
+        self._pictures = 0
+
+    @property
+    def lens(self) -> Lens:
+        """The lens within its circle."""
+        return self._lens.seen_within(self._circle.angle_rad)
+
+    def look(self, image: np.ndarray) -> bool:
+        """Learn from the next picture (height, width[, channels]); whether `lens` may be news."""
+        self._pictures += 1
+        is_due = self._pictures & (self._pictures - 1) == 0
+        return is_due and (self._circle.look(image) or self._pictures == 1)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fisheye_geometry.image_circle import ImageCircle
+from fisheye_geometry.image_circle import ImageCircle, SeenLens
 from fisheye_geometry.lens import make_lens
 
 LENS = make_lens('equidistant', 640, 480, [150, 0, 310, 0, 150, 245, 0, 0, 1], [-0.02, 0, 0, 0])
@@ -51,3 +51,12 @@ def test_what_was_seen_lit_is_never_dark_again():
 
 def test_a_picture_of_another_size_is_ignored():
     assert not ImageCircle(LENS).look(np.zeros((10, 10), np.uint8))
+
+
+def test_the_circle_of_a_lens_is_looked_for_ever_more_seldom():
+    seen = SeenLens(LENS)
+    whole = seen.lens
+    assert seen.look(np.zeros((LENS.height, LENS.width), np.uint8)), 'the first is always news'
+    told = [seen.look(picture(70, 120, 3)) for _ in range(3)]
+    assert told == [True, False, False]
+    assert seen.lens.max_angle_rad < whole.max_angle_rad

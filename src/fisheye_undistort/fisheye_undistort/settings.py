@@ -39,6 +39,9 @@ class SurfaceSettings:
         maximum=179.0,
         live=True,
     )
+    transport: str = setting(
+        'raw', 'How pictures of topics are taken: raw, or as JPEG.', choices=('raw', 'compressed')
+    )
 
     def surface_of(self, lens: Lens, width: int = 0, height: int = 0) -> Surface:
         """Give the surface on which a camera's pictures are corrected."""
@@ -63,9 +66,6 @@ class UndistortSettings(SurfaceSettings):
         minimum=0,
         maximum=8192,
         live=True,
-    )
-    transport: str = setting(
-        'raw', 'Subscribe to the raw pictures or to their JPEG.', choices=('raw', 'compressed')
     )
     height: int = setting(
         0,

@@ -164,9 +164,9 @@ def test_unusable_pictures_are_dropped_and_counted(make_bench):
     bench.until(lambda: bench.pictures, 'a picture')
     small = np.zeros((12, 16, 3), np.uint8)
     for sending in ({'encoding': 'mono16'}, {'picture': small}, {'encoding': 'bgra8'}):
-        refused = bench.node._input.refused
+        refused = bench.node._camera.refused
         bench.until(
-            lambda before=refused: bench.node._input.refused > before, 'refusal', **sending
+            lambda before=refused: bench.node._camera.refused > before, 'refusal', **sending
         )
     count = len(bench.pictures)
     bench.until(lambda: len(bench.pictures) > count, 'a picture again')

@@ -19,9 +19,9 @@ CAMERAS = ('left', 'right')
 ARGUMENTS = {
     'composed': ('false', 'one process from cameras to panorama instead of five nodes'),
     'robot': ('false', 'only the captures, on the robot'),
-    'base': ('false', 'only undistort and stitch, at the other end of the link'),
+    'base': ('false', 'all but the captures, at the other end of the link'),
     'params_file': (str(CONFIG / 'panorama.yaml'), 'parameters that differ from the defaults'),
-    'transport': ('', 'how undistort gets its pictures: raw or compressed'),
+    'transport': ('', 'how pictures are taken from topics: raw or compressed'),
     'frame_rate_hz': ('', 'frames a second of each camera'),
     'overlap_file': ('', 'where the overlap is read at start and saved on request'),
     'left_source': ('', 'what the left camera is: device, picture, folder, video or URL'),
@@ -38,7 +38,10 @@ ARGUMENTS = {
 
 def nodes(context):
     """Say which nodes to start; an argument that was not given leaves the parameter alone."""
-    arguments = context.launch_configurations
+    arguments = dict(context.launch_configurations)
+    robot, base, composed = (arguments[name] == 'true' for name in ('robot', 'base', 'composed'))
+    if base and composed:
+        arguments.update({f'{camera}_source': 'topic' for camera in CAMERAS})
 
     def parameters(**names):
         given = {name: arguments[argument] for name, argument in names.items()}
@@ -59,14 +62,6 @@ def nodes(context):
         extras.append(node('panorama_stitch', 'viewer_node', 'viewer', host='host'))
     if arguments['transforms'] == 'true':
         extras += transforms(arguments)
-    if arguments['composed'] == 'true':
-        own = {
-            f'{camera}.{name}': f'{camera}_{name}'
-            for camera in CAMERAS
-            for name in ('source', 'camera_info_url')
-        }
-        shared = {name: name for name in ('frame_rate_hz', 'overlap_file')}
-        return [node('panorama_stitch', 'panorama_node', 'panorama', **own, **shared), *extras]
     captures = [
         node(
             'fisheye_capture',
@@ -79,14 +74,23 @@ def nodes(context):
         )
         for camera in CAMERAS
     ]
-    rest = [
-        node('fisheye_undistort', 'undistort_node', 'undistort', camera, transport='transport')
-        for camera in CAMERAS
-    ]
-    rest.append(node('panorama_stitch', 'stitch_node', 'stitch', overlap_file='overlap_file'))
-    rest += extras
-    robot, base = (arguments[half] == 'true' for half in ('robot', 'base'))
-    return (captures if robot or not base else []) + (rest if base or not robot else [])
+    if composed:
+        own = {
+            f'{camera}.{name}': f'{camera}_{name}'
+            for camera in CAMERAS
+            for name in ('source', 'camera_info_url')
+        }
+        shared = {name: name for name in ('frame_rate_hz', 'overlap_file', 'transport')}
+        rest = [node('panorama_stitch', 'panorama_node', 'panorama', **own, **shared)]
+    else:
+        rest = [
+            node('fisheye_undistort', 'undistort_node', 'undistort', camera, transport='transport')
+            for camera in CAMERAS
+        ]
+        rest.append(node('panorama_stitch', 'stitch_node', 'stitch', overlap_file='overlap_file'))
+    has_captures = robot or not (base or composed)
+    has_rest = base or not robot
+    return (captures if has_captures else []) + (rest + extras if has_rest else [])
 
 
 def transforms(arguments):

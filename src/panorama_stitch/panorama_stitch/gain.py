@@ -168,9 +168,8 @@ class _Multiplier:
         """Use other factors (channels,)."""
         self._is_grey = factors.max() <= factors.min() * (1 + _SMALLEST_TINT)
         self._scale = float(factors.mean() if self._is_grey else factors.max())
-        weights = np.rint(255 * factors / factors.max()).astype(np.uint8)
-        if (weights != self._weights[0, 0]).any():
-            self._weights[:] = weights
+        if not self._is_grey:
+            self._weights[:] = np.rint(255 * factors / factors.max())
 
     def __call__(self, drawn: np.ndarray) -> None:
         if not self._is_grey:

@@ -4,19 +4,23 @@ from dataclasses import fields
 
 from std_msgs.msg import Header
 
-from fisheye_bridge.diagnostics import ERROR
-from fisheye_bridge.images import to_message
+from fisheye_bridge.camera_topics import CameraSubscription
+from fisheye_bridge.diagnostics import ERROR, Report
 from fisheye_bridge.parameters import Parameters
 from fisheye_bridge.running import run
-from fisheye_bridge.stamps import stamp_of
+from fisheye_bridge.stamps import ns_of, stamp_of
 from fisheye_bridge.topics import ImagePublisher
 from fisheye_capture.calibration_url import calibration_of
 from fisheye_capture.grabber import Grabber
 from fisheye_capture.settings import CameraSettings, CaptureSettings, FrameSettings
-from fisheye_geometry.errors import CameraFileError
-from fisheye_geometry.image_circle import ImageCircle
+from fisheye_geometry.errors import CameraFileError, FisheyeError
+from fisheye_geometry.image_circle import SeenLens
+from fisheye_geometry.lens import Lens
 from panorama_stitch.base_node import PanoramaBase
 from panorama_stitch.settings import PanoramaSettings
+
+TOPIC = 'topic'
+"""The source that is no camera of this node: another one publishes the pictures."""
 
 
 class PanoramaNode(PanoramaBase):
@@ -24,14 +28,14 @@ class PanoramaNode(PanoramaBase):
 
     def __init__(self, **kwargs):
         super().__init__('panorama', PanoramaSettings, **kwargs)
-        self._eyes = [_Eye(self, camera) for camera in self.settings.cameras]
+        self._eyes = [_eye(self, camera) for camera in self.settings.cameras]
         for eye in self._eyes:
-            eye.grabber.start()
+            eye.start()
 
     def destroy_node(self) -> None:
         """Release the cameras too."""
         for eye in getattr(self, '_eyes', ()):
-            eye.grabber.stop()
+            eye.stop()
         super().destroy_node()
 
     def _apply(self, settings: PanoramaSettings) -> None:
@@ -42,22 +46,35 @@ class PanoramaNode(PanoramaBase):
     def _report(self, report) -> None:
         super()._report(report)
         for eye in self._eyes:
-            grabber = eye.grabber
-            report.values[f'{eye.name} skipped'] = grabber.skipped
-            if grabber.reason:
-                report.add(
-                    ERROR,
-                    f'{eye.name}: {grabber.reason} (attempts to reopen: {grabber.attempts})',
-                )
+            eye.report(report)
 
 
 class _Eye:
-    """One camera of the node: where its frames come from, and what they show."""
+    """One camera: where its frames come from, and what they show."""
+
+    lens: Lens | None
 
     def __init__(self, node: PanoramaNode, name: str):
-        self.name = name
-        self._node = node
-        own = Parameters(node, CameraSettings, prefix=f'{name}.').settings
+        self._node, self._name = node, name
+
+    def place(self, settings: PanoramaSettings) -> None:
+        """Say what the camera's pictures show, if it is known."""
+        if self.lens:
+            surface = settings.surface_of(self.lens)
+            self._node.live.place(self._name, self.lens, surface, settings.interpolation)
+
+    def start(self) -> None:
+        """Begin to read."""
+
+    def stop(self) -> None:
+        """Release the camera."""
+
+
+class _OwnEye(_Eye):
+    """A camera that the node reads itself."""
+
+    def __init__(self, node: PanoramaNode, name: str, own: CameraSettings):
+        super().__init__(node, name)
         shared = {
             entry.name: getattr(node.settings, entry.name) for entry in fields(FrameSettings)
         }
@@ -66,40 +83,84 @@ class _Eye:
         }
         self._settings = CaptureSettings(**named, **shared)
         self._raw = ImagePublisher(node, f'{name}/image_raw')
-        self._frames = 0
-        self.grabber = Grabber(self._settings, self._take, on_change=self._tell)
-        camera = calibration_of(self._settings.camera_info_url) or self.grabber.camera
+        self._grabber = Grabber(self._settings, self._take, on_change=self._tell)
+        camera = calibration_of(self._settings.camera_info_url) or self._grabber.camera
         if camera is None:
             raise CameraFileError(
                 f'{name}.camera_info_url is empty; expected the calibration file of {own.source} '
                 '(calibrate_lens makes one)'
             )
-        self._lens = camera.lens
-        self._circle = ImageCircle(self._lens)
+        self._seen = SeenLens(camera.lens)
         self.place(node.settings)
 
-    def place(self, settings: PanoramaSettings) -> None:
-        """Say what the camera's pictures show, as far as its light reaches."""
-        lens = self._lens.seen_within(self._circle.angle_rad)
-        self._node.live.place(self.name, lens, settings.surface_of(lens), settings.interpolation)
+    @property
+    def lens(self) -> Lens:
+        return self._seen.lens
+
+    def start(self) -> None:
+        self._grabber.start()
+
+    def stop(self) -> None:
+        self._grabber.stop()
+
+    def report(self, report: Report) -> None:
+        grabber = self._grabber
+        report.values[f'{self._name} skipped'] = grabber.skipped
+        if grabber.reason:
+            report.add(
+                ERROR,
+                f'{self._name}: {grabber.reason} (attempts to reopen: {grabber.attempts})',
+            )
 
     def _take(self, frame) -> None:
-        # The image circle does not change: look ever more seldom.
-        self._frames += 1
-        if self._frames & (self._frames - 1) == 0 and self._circle.look(frame.image):
+        try:
+            image, encoding = frame.image, self._settings.encoding
+        except FisheyeError as error:
+            self._node.warn(f'{self._name}: a picture was dropped: {error}')
+            return
+        if self._seen.look(image):
             self.place(self._node.settings)
-        encoding = self._settings.encoding
-        self._node.take(self.name, frame.stamp_ns, frame.image, encoding)
+        self._node.take(self._name, frame.stamp_ns, image, encoding)
         if self._raw.wanted:
             header = Header(stamp=stamp_of(frame.stamp_ns), frame_id=self._settings.frame_id)
-            message = to_message(frame.image, encoding, header)
-            self._raw.publish(message, frame.image, self._node.settings.jpeg_quality)
+            quality = self._node.settings.jpeg_quality
+            self._raw.publish_picture(frame, encoding, header, quality)
 
     def _tell(self, reason: str) -> None:
         if reason:
-            self._node.warn(f'{self.name}: no pictures: {reason}')
+            self._node.warn(f'{self._name}: no pictures: {reason}')
         else:
-            self._node.get_logger().info(f'{self.name}: pictures come')
+            self._node.get_logger().info(f'{self._name}: pictures come')
+
+
+class _TopicEye(_Eye):
+    """A camera that another node reads."""
+
+    def __init__(self, node: PanoramaNode, name: str):
+        super().__init__(node, name)
+        self._camera = CameraSubscription(
+            node,
+            on_picture=self._take,
+            on_lens=lambda lens, header: self.place(node.settings),
+            check=lambda lens: node.settings.surface_of(lens),
+            namespace=name,
+            transport=node.settings.transport,
+        )
+
+    @property
+    def lens(self) -> Lens | None:
+        return self._camera.lens
+
+    def report(self, report: Report) -> None:
+        self._camera.report(report, is_used=self._node.live.stitcher.knows(self._name))
+
+    def _take(self, image, encoding, header) -> None:
+        self._node.take(self._name, ns_of(header.stamp), image, encoding)
+
+
+def _eye(node: PanoramaNode, name: str) -> _OwnEye | _TopicEye:
+    own = Parameters(node, CameraSettings, prefix=f'{name}.').settings
+    return _TopicEye(node, name) if own.source == TOPIC else _OwnEye(node, name, own)
 
 
 def main() -> int:

@@ -65,6 +65,10 @@ class Stitcher:
             self.overlaps = None
         return True
 
+    def knows(self, camera: str) -> bool:
+        """Whether it is known what a camera sees."""
+        return self.cameras.index(camera) in self._places
+
     def check(self, camera: str, image: np.ndarray) -> None:
         """Raise an `ImageFormatError` for a picture of another size than the camera's."""
         place = self._places.get(self.cameras.index(camera))

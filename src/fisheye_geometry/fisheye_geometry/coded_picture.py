@@ -1,11 +1,15 @@
-"""The head of a coded picture: how large it will be, known before anything is decoded."""
+"""Coded pictures: decoded only after their head said how large they will be."""
 
+import cv2
 import numpy as np
 
 from fisheye_geometry.errors import ImageFormatError
 
 _PNG = b'\x89PNG\r\n\x1a\n'
 _JPEG = b'\xff\xd8'
+_END = b'\xff\xd9'
+_MAX_PIXELS = 50_000_000
+"""A few bytes can claim to be more than fits into memory."""
 _NO_FRAMES = 0xC4, 0xC8, 0xCC
 """Markers of tables among those that begin a frame."""
 
@@ -41,6 +45,34 @@ def size_of(coded: np.ndarray) -> tuple[int, int]:
             else:
                 at += 2 + _number(data[at + 2 : at + 4])
     raise ImageFormatError(f'{len(data)} bytes are no picture; expected JPEG or PNG')
+
+
+def whole_jpeg(coded: np.ndarray) -> np.ndarray | None:
+    """Give a JPEG (n,) uint8 without what lies behind its end; None if it is torn before."""
+    end = coded.tobytes().rfind(_END)
+    return None if end < 0 else coded[: end + len(_END)]
+
+
+def decoded(coded: np.ndarray, *, grey: bool = False) -> np.ndarray:
+    """Decode a JPEG or PNG, (n,) uint8, to (height, width, 3) BGR or (height, width), uint8.
+
+    Raises
+    ------
+    ImageFormatError
+        If it is no picture, or one that is too large.
+    """
+    width, height = size_of(coded)
+    if not 1 <= width * height <= _MAX_PIXELS:
+        raise ImageFormatError(
+            f'a picture of {width}x{height} px; expected up to {_MAX_PIXELS / 1e6:g} million px'
+        )
+    try:
+        image = cv2.imdecode(coded, cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR)
+    except cv2.error:
+        image = None
+    if image is None:
+        raise ImageFormatError(f'a broken picture of {width}x{height} px ({coded.size} bytes)')
+    return image
 
 
 def _number(data: memoryview) -> int:

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from fisheye_bridge.picture_head import size_of
+from fisheye_geometry.coded_picture import decoded, size_of, whole_jpeg
 from fisheye_geometry.errors import ImageFormatError
 
 PICTURE = np.random.default_rng(1).integers(0, 256, (37, 53, 3), np.uint8)
@@ -32,3 +32,11 @@ def test_what_ends_too_early_or_is_something_else_is_refused(suffix):
     for count in range(0, 24):
         with pytest.raises(ImageFormatError, match=f'{count} bytes are no picture; expected JPEG'):
             size_of(coded[:count])
+
+
+def test_a_jpeg_ends_where_it_says():
+    coded = cv2.imencode('.jpg', PICTURE)[1].ravel()
+    padded = np.append(coded, np.zeros(100, np.uint8))
+    np.testing.assert_array_equal(whole_jpeg(padded), coded)
+    assert whole_jpeg(coded[:-10]) is None
+    np.testing.assert_array_equal(decoded(padded), cv2.imdecode(coded, cv2.IMREAD_COLOR))

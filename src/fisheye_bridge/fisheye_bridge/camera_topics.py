@@ -1,0 +1,146 @@
+"""A camera's topics: its pictures, and the lens that took them as far as it can be trusted."""
+
+from collections.abc import Callable
+
+import numpy as np
+from rclpy.node import Node
+from sensor_msgs.msg import CameraInfo
+from std_msgs.msg import Header
+
+from fisheye_bridge.camera_info import camera_of
+from fisheye_bridge.diagnostics import ERROR, WARN, Report
+from fisheye_bridge.qos import IMAGE
+from fisheye_bridge.topics import WARNING_PAUSE_S, ImageSubscription
+from fisheye_geometry.errors import CalibrationError, FisheyeError
+from fisheye_geometry.image_circle import SeenLens
+from fisheye_geometry.lens import Lens
+
+
+class CameraSubscription:
+    """Subscribes to image_raw and camera_info, and keeps what is broken away.
+
+    Attributes
+    ----------
+    lens : Lens or None
+        The last good one, within the circle that it lights.
+    refused : int
+        Pictures that were not usable.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        *,
+        on_picture: Callable[[np.ndarray, str, Header], None],
+        on_lens: Callable[[Lens, Header], None],
+        check: Callable[[Lens], object],
+        namespace: str = '',
+        transport: str = 'raw',
+    ):
+        """Subscribe.
+
+        Parameters
+        ----------
+        node
+            Who subscribes.
+        on_picture
+            Called with each picture, (height, width[, 3]) uint8, its encoding and its header.
+        on_lens
+            Called with a lens that may be news and the header of its camera_info: when its first
+            picture has shown the circle that it lights, or when no picture comes.
+        check
+            Called with a lens that comes; a `FisheyeError` that it raises refuses that lens, and
+            the one before stays.
+        namespace
+            Of the topics, below that of the node.
+        transport
+            'raw' or 'compressed', of the pictures.
+        """
+        self._node = node
+        self._on_picture, self._on_lens, self._check = on_picture, on_lens, check
+        self._prefix = f'{namespace}/' if namespace else ''
+        self._seen: SeenLens | None = None
+        self._content, self._header = '', Header()
+        self._picture_size: tuple[int, int] | None = None
+        self._refusal, self._is_over = '', False
+        self._pictures = ImageSubscription(
+            node, f'{self._prefix}image_raw', self._take_picture, transport=transport
+        )
+        node.create_subscription(
+            CameraInfo, f'{self._prefix}camera_info', self._take_camera_info, IMAGE
+        )
+
+    @property
+    def lens(self) -> Lens | None:
+        """The last good lens."""
+        return self._seen.lens if self._seen else None
+
+    @property
+    def refused(self) -> int:
+        """Pictures that were dropped."""
+        return self._pictures.refused
+
+    def refuse(self, error: FisheyeError) -> None:
+        """Say that a lens cannot be used."""
+        self._refusal, self._is_over = str(error), False
+        kept = '; the last good calibration stays in use' if self._seen else ''
+        self._node.get_logger().warning(
+            f'{self._prefix}camera_info refused: {error}{kept}',
+            throttle_duration_sec=WARNING_PAUSE_S,
+        )
+
+    def report(self, report: Report, *, is_used: bool) -> None:
+        """Say what is wrong; a refusal once more after the camera_info in use came again.
+
+        Parameters
+        ----------
+        report
+            To be filled.
+        is_used
+            Whether some lens of this camera is in use.
+        """
+        if self._refusal:
+            level = WARN if is_used else ERROR
+            report.add(level, f'{self._prefix}camera_info refused: {self._refusal}')
+        elif not is_used:
+            what = f'{self._prefix}image_raw' if self._seen else f'{self._prefix}camera_info'
+            report.add(ERROR, f'waiting for {what}')
+        if self._is_over:
+            self._refusal = ''
+        if self.refused:
+            report.values[f'{self._prefix}pictures refused'.replace('/', ' ')] = self.refused
+
+    def _take_camera_info(self, message: CameraInfo) -> None:
+        size = message.width, message.height
+        content = repr((*size, message.distortion_model, *message.k, *message.d))
+        if content == self._content:
+            self._is_over = True
+            if self._picture_size is None:
+                self._tell()
+            return
+        try:
+            if self._picture_size not in (None, size):
+                raise CalibrationError(
+                    '{}x{} px do not fit the pictures, which have {}x{} px'.format(
+                        *size, *self._picture_size
+                    )
+                )
+            lens = camera_of(message).lens
+            self._check(lens)
+        except FisheyeError as error:
+            self.refuse(error)
+            return
+        self._content, self._header = content, message.header
+        self._seen = SeenLens(lens)
+
+    def _take_picture(self, image: np.ndarray, encoding: str, header: Header) -> None:
+        self._picture_size = image.shape[1::-1]
+        if self._seen and self._seen.look(image):
+            self._tell()
+        self._on_picture(image, encoding, header)
+
+    def _tell(self) -> None:
+        try:
+            self._on_lens(self.lens, self._header)
+        except FisheyeError as error:
+            self.refuse(error)

@@ -1,0 +1,114 @@
+"""Cameras on the robot, the rest at the base, and nothing but a cable between them."""
+
+import os
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from field import RETURN_S, START_S
+from namespaces import Link
+from rig import SIDES, Rig, wait_for
+
+LONG = bool(os.environ.get('LONG'))
+RATE_HZ = 30.0
+WATCHED_S = 30.0 if LONG else 5.0
+SETTLE_S = 2.0
+CUTS_S = (5.0, 30.0) if LONG else (5.0,)
+OLD_MS = 500.0
+"""A picture that waited somewhere while the cable was out would be seconds old."""
+SCHEDULING = 0.2
+"""Share of the frames that a busy machine may not even take."""
+BASES = {'five nodes': ('left/undistort', 'right/undistort', 'stitch'), 'two': ('panorama',)}
+
+
+@pytest.fixture
+def link():
+    with Link() as link:
+        yield link
+
+
+@pytest.fixture
+def rig(domain, tmp_path):
+    # Beyond this machine, as the two halves of a real rig need it.
+    environment = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET'}
+    with Rig(domain, tmp_path / 'log', environment) as rig:
+        yield rig
+
+
+def start(rig, link, base_nodes):
+    for side in SIDES:
+        rig.start(f'{side}/capture', link.robot.prefix, frame_rate_hz=RATE_HZ)
+    for node in base_nodes:
+        parameters = {}
+        if node == 'panorama':
+            parameters = {f'{side}.source': 'topic' for side in SIDES}
+        if node != 'stitch':
+            parameters['transport'] = 'compressed'
+        rig.start(node, link.base.prefix, **parameters)
+    for side in SIDES:
+        listen(rig, link.robot, side, f'/{side}/camera_info', 'CameraInfo')
+    listen(rig, link.base, 'panorama', '/panorama/image', 'Image')
+
+
+def listen(rig, end, name, topic, kind):
+    program = str(Path(__file__).parents[1] / 'tools' / 'subscriber.py')
+    rig.run(name + ' heard', [*end.prefix, sys.executable, program, topic, '--kind', kind])
+
+
+def heard(rig, name):
+    """Give the stamps, ns, and delays, ms, that a listener has printed."""
+    lines = rig.log(name + ' heard').read_text().splitlines(keepends=True)
+    pairs = [line.split() for line in lines if line.endswith('\n')]
+    return [(int(stamp), float(delay)) for stamp, delay in pairs]
+
+
+def came_after(rig, ns):
+    """Give the moments, ns, when panoramas arrived after one."""
+    arrived = [stamp + delay * 1e6 for stamp, delay in heard(rig, 'panorama')]
+    return [moment for moment in arrived if moment > ns]
+
+
+def watch(rig):
+    """Let it run; give what both cameras took, and which panoramas came of it."""
+    begin_ns = time.time_ns() + int(SETTLE_S * 1e9)
+    end_ns = begin_ns + int(WATCHED_S * 1e9)
+    wait_for(
+        lambda: rig.check_alive() or came_after(rig, end_ns), WATCHED_S + START_S, 'panoramas'
+    )
+    taken, came = (
+        [{stamp for stamp, _ in heard(rig, name) if begin_ns <= stamp <= end_ns} for name in names]
+        for names in (SIDES, ['panorama'])
+    )
+    return set.intersection(*taken), came[0]
+
+
+@pytest.mark.parametrize('nodes', BASES.values(), ids=BASES)
+def test_a_link_carries_every_pair_and_comes_back_when_it_was_cut(rig, link, nodes):
+    start(rig, link, nodes)
+    wait_for(lambda: rig.check_alive() or heard(rig, 'panorama'), START_S, 'a first panorama')
+    due, came = watch(rig)
+    print(f'\n{len(due)} pairs in {WATCHED_S:g} s over the link, {len(due - came)} lost')
+    assert len(due) > WATCHED_S * RATE_HZ * (1 - SCHEDULING)
+    assert due <= came, 'pairs that got lost'
+    for cut_s in CUTS_S:
+        link.cut()
+        cut_ns = time.time_ns()
+        wait_for(lambda ns=cut_ns: time.time_ns() > ns + cut_s * 1e9, START_S, 'the cut')
+        link.mend()
+        mended_ns = time.time_ns()
+        late_ns = cut_ns + OLD_MS * 1e6
+        assert not [ns for ns in came_after(rig, late_ns) if ns < mended_ns], 'it was not cut'
+        first_ns = wait_for(
+            lambda ns=mended_ns: rig.check_alive() or came_after(rig, ns), START_S, 'a panorama'
+        )[0]
+        back_s = (first_ns - mended_ns) / 1e9
+        due, came = watch(rig)
+        delays = [d for s, d in heard(rig, 'panorama') if s + d * 1e6 > mended_ns]
+        print(
+            f'the link cut for {cut_s:g} s: back {back_s:.2f} s after it, the oldest picture '
+            f'{max(delays):.0f} ms old, then {len(due - came)} of {len(due)} pairs lost'
+        )
+        assert back_s < RETURN_S
+        assert max(delays) < OLD_MS, 'old pictures were queued up'
+        assert due <= came
