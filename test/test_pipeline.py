@@ -3,7 +3,6 @@
 import json
 import math
 import os
-import signal
 import time
 
 import pytest
@@ -139,17 +138,6 @@ def test_the_one_node_takes_cameras_that_other_nodes_read(rig, watcher, transpor
     assert overlap.offset_deg == pytest.approx(140, abs=0.5)
     taken = [watcher.node.count_subscribers(f'left/image_raw{end}') for end in ('', '/compressed')]
     assert taken == ([1, 0] if transport == 'raw' else [0, 1])
-
-
-@pytest.mark.parametrize('with_signal', [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize('node', ['left/capture', 'left/undistort', 'stitch', 'panorama'])
-def test_a_lone_node_ends_at_once(rig, watcher, node, with_signal):
-    rig.start(node)
-    name = node.split('/')[-1]
-    wait_for(lambda: name in watcher.node.get_node_names(), START_S, f'{node} in the graph')
-    code, seconds = rig.stop(node, with_signal)
-    assert code == 0, rig.log(node).read_text()
-    assert seconds < STOP_S
 
 
 @pytest.mark.parametrize(

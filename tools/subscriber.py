@@ -1,4 +1,4 @@
-"""A subscriber as a process of its own: a line with stamp and delay for each message that comes."""
+"""A subscriber as a process of its own: a line with stamp and delay of each message."""
 
 import argparse
 import time

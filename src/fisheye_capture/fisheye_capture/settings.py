@@ -52,7 +52,7 @@ class CameraSettings:
     source: str = setting(
         'synthetic',
         'synthetic, a device (0, /dev/video0), a picture, a folder or glob of pictures, a video, '
-        'or an http, rtsp or udp URL; for panorama_node also topic: another node reads the camera.',
+        'or an http, rtsp or udp URL; for panorama_node also topic: another node reads it.',
     )
     camera_info_url: str = setting(
         '', 'Calibration file: a path, file:// or package://; empty: none (synthetic: its own).'
