@@ -21,8 +21,7 @@ from fisheye_bridge.stamps import stamp_of
 from fisheye_geometry.errors import FisheyeError
 from fisheye_undistort.settings import UndistortSettings
 
-EXAMPLES = 1000 if os.environ.get('LONG') else 200
-FEW = EXAMPLES // 4
+EXAMPLES, FEW = (1000, 1000) if os.environ.get('LONG') else (200, 50)
 TAKEN = 0.9
 """Share of the nonsense that is surely taken: a busy machine may skip some of it."""
 FLAT_MIB = 5.0
