@@ -16,7 +16,7 @@ from fisheye_geometry.camera_file import read_camera
 from fisheye_geometry.image_circle import ImageCircle
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.remap import Turn
-from panorama_stitch.overlap import Overlap
+from panorama_stitch.overlap_result import Overlap
 from panorama_stitch.settings import PanoramaSettings
 from panorama_stitch.stitcher import Stitcher
 

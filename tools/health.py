@@ -106,9 +106,10 @@ class Health(Watcher):
 
 
 class Usage(NamedTuple):
-    """What a process uses."""
+    """What a process uses; of its resident memory, what it shares with others apart."""
 
     resident_mib: float
+    shared_mib: float
     files: int
     threads: int
 
@@ -116,6 +117,6 @@ class Usage(NamedTuple):
 def usage(pid: int) -> Usage:
     """Give what a process uses now."""
     folder = Path(f'/proc/{pid}')
-    pages = int((folder / 'statm').read_text().split()[1])
+    resident, shared = (int(pages) / 256 for pages in (folder / 'statm').read_text().split()[1:3])
     files, threads = (len(list((folder / part).iterdir())) for part in ('fd', 'task'))
-    return Usage(pages / 256, files, threads)
+    return Usage(resident, shared, files, threads)

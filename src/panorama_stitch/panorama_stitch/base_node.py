@@ -4,7 +4,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import asdict
 from itertools import pairwise
-from math import degrees, nan
+from math import degrees
 
 import numpy as np
 from fisheye_msgs.msg import Overlap, Overlaps, Particle, Projection
@@ -22,10 +22,12 @@ from fisheye_bridge.stamps import stamp_of
 from fisheye_bridge.topics import WARNING_PAUSE_S, ImagePublisher
 from fisheye_capture.rate import Rate
 from fisheye_geometry.errors import FisheyeError, SettingError
-from panorama_stitch import overlap
 from panorama_stitch.compositor import Compositor
 from panorama_stitch.figures import figures
 from panorama_stitch.live import LiveStitcher
+from panorama_stitch.overlap_result import Overlap as OverlapResult
+from panorama_stitch.overlap_result import apart_rad
+from panorama_stitch.overlap_settings import METHODS
 from panorama_stitch.settings import PanoramaOutputSettings
 from panorama_stitch.stale import write_age
 
@@ -39,14 +41,9 @@ class PanoramaBase(Node):
     def __init__(self, name: str, settings: type[PanoramaOutputSettings], **kwargs):
         super().__init__(name, **kwargs)
         self._declared = Parameters(self, settings, on_change=self._apply)
-        cameras = self.settings.cameras
-        if len(set(cameras)) != len(cameras) or len(cameras) < 2:
-            raise SettingError(
-                f'cameras is {list(cameras)}; expected at least two different names'
-            )
         self._buffer: ImageBuffer | None = None
         self._encoding = ''
-        self._published, self._rate = 0, Rate()
+        self._handled, self._published, self._rate = 0, 0, Rate()
         self._shedding = Shedding('pairs')
         self._latencies_ms: deque[float] = deque(maxlen=_LATENCIES)
         self._image = ImagePublisher(self, 'panorama/image')
@@ -83,6 +80,7 @@ class PanoramaBase(Node):
         stamp_ns: int,
         ages_s: dict[str, float],
     ) -> None:
+        self._handled += 1
         if not self._image.wanted:
             return
         surface = compositor.layout.surface
@@ -99,9 +97,9 @@ class PanoramaBase(Node):
         self._rate.count()
         self._latencies_ms.append((self.get_clock().now().nanoseconds - stamp_ns) / 1e6)
 
-    def _announce(self) -> None:
-        """Publish what is in use now, for those who come later too."""
-        header = _header(self.get_clock().now().nanoseconds)
+    def _announce(self, stamp_ns: int) -> None:
+        """Publish what is in use from some pictures on, for those who come later too."""
+        header = _header(stamp_ns)
         surface = self.live.compositor.layout.surface
         self._projection.publish(projection_of(surface, header))
         in_use = self.live.stitcher.in_use(self.settings)
@@ -109,26 +107,27 @@ class PanoramaBase(Node):
 
     async def _calibrate(self, request, response):
         try:
-            if request.method not in ('', *overlap.METHODS):
+            if request.method not in ('', *METHODS):
                 raise SettingError(
-                    f"method is '{request.method}'; expected one of {', '.join(overlap.METHODS)}"
+                    f"method is '{request.method}'; expected one of {', '.join(METHODS)}"
                 )
             # Frames keep coming meanwhile: a coroutine, not a thread, waits for the answer.
             measured = await awaitable(self.live.calibrate(request.method, request.save))
+            response.overlaps = self._messages(measured)
         except FisheyeError as error:
             response.success, response.message = False, str(error)
             return response
-        response.success = True
-        response.message = '; '.join(result.message for result in measured)
-        response.overlaps = self._messages(measured)
+        sentences = [result.message for result in measured]
+        if request.save:
+            is_saved = all(result.found for result in measured)
+            sentences.append('saved' if is_saved else 'not saved')
+        response.success, response.message = True, '; '.join(sentences)
         return response
 
-    def _messages(self, results: Sequence[overlap.Overlap]) -> list[Overlap]:
+    def _messages(self, results: Sequence[OverlapResult]) -> list[Overlap]:
         cameras, surfaces = self.settings.cameras, self.live.stitcher.surfaces
-        return [
-            _overlap_message(result, names, surface)
-            for result, names, surface in zip(results, pairwise(cameras), surfaces, strict=False)
-        ]
+        neighbours = pairwise(cameras), pairwise(surfaces)
+        return [_overlap_message(*entry) for entry in zip(results, *neighbours, strict=True)]
 
     def warn(self, sentence: str) -> None:
         """Log a warning, but not one after the other."""
@@ -137,7 +136,9 @@ class PanoramaBase(Node):
     def _report(self, report: Report) -> None:
         live = self.live
         if live.compositor is None:
-            report.add(ERROR, 'no panorama yet: waiting for frames of every camera')
+            report.add(ERROR, f'no panorama yet: {live.trouble or "in preparation"}')
+        elif live.trouble:
+            report.add(WARN, live.trouble)
         if not all(result.found for result in live.overlaps):
             report.add(WARN, 'no overlap: frames are side by side')
         if live.unpaired_s > self.settings.stale_after_s:
@@ -152,8 +153,9 @@ class PanoramaBase(Node):
         for camera, age_s in ages_s.items():
             report.add(ERROR if all_stale else WARN, f'{camera}: no picture for {age_s:.0f} s')
         if not ages_s:
-            shed = live.dropped + max(live.pairing.unpaired.values())
-            self._shedding.tell(report, self._published, shed)
+            # What only one camera has too many of comes from its rate, not from this machine.
+            shed = live.dropped + min(live.pairing.unpaired.values())
+            self._shedding.tell(report, self._handled, shed)
         report.values['rate Hz'] = self._rate.hz
         report.values['panoramas published'] = self._published
         report.values.update(figures(live))
@@ -167,17 +169,17 @@ def _header(stamp_ns: int) -> Header:
     return Header(stamp=stamp_of(stamp_ns), frame_id=FRAME_ID)
 
 
-def _overlap_message(result: overlap.Overlap, names, surface) -> Overlap:
-    """Describe an overlap; the angle is that between the two optical axes on this surface."""
-    angle = degrees(result.offset_x_px / surface.focal_px) if surface.turns_are_shifts else nan
+def _overlap_message(result: OverlapResult, names, surfaces) -> Overlap:
+    """Describe the overlap of two neighbours."""
     return Overlap(
+        header=_header(result.stamp_ns),
         left_camera=names[0],
         right_camera=names[1],
         method=result.method,
         found=result.found,
         offset_x_px=result.offset_x_px,
         offset_y_px=result.offset_y_px,
-        offset_deg=angle,
+        offset_deg=degrees(apart_rad(result.offset_x_px, *surfaces)),
         pitch_deg=degrees(result.turn.pitch_rad),
         roll_deg=degrees(result.turn.roll_rad),
         overlap_px=result.overlap_px,

@@ -10,7 +10,10 @@ from panorama_stitch.live import LiveStitcher
 def figures(live: LiveStitcher) -> dict[str, float | str]:
     """Give rates, losses, skew and the overlaps in use, each with its name and unit."""
     cameras = live.stitcher.cameras
-    values: dict[str, float | str] = {'pairs overtaken': live.dropped}
+    values: dict[str, float | str] = {
+        'pairs overtaken': live.dropped,
+        'pairs broken': live.broken,
+    }
     for camera in cameras:
         values[f'{camera} rate Hz'] = live.rates[camera].hz
         values[f'{camera} unpaired'] = live.pairing.unpaired[camera]

@@ -14,7 +14,7 @@ from fisheye_geometry.errors import FisheyeError
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.surface import Surface
 from panorama_stitch.compositor import Compositor
-from panorama_stitch.overlap import Overlap
+from panorama_stitch.overlap_result import Overlap
 from panorama_stitch.pairing import FramePairing
 from panorama_stitch.preparation import Preparation
 from panorama_stitch.settings import PanoramaOutputSettings
@@ -55,6 +55,8 @@ class LiveStitcher:
         What waits for its partner.
     rates : dict of Rate
         At which each camera's frames come.
+    broken : int
+        Groups that could not be drawn.
     """
 
     def __init__(
@@ -62,7 +64,7 @@ class LiveStitcher:
         settings: PanoramaOutputSettings,
         *,
         publish: Callable[[Compositor, list[np.ndarray], int, dict[str, float]], None],
-        changed: Callable[[], None],
+        changed: Callable[[int], None],
         warn: Callable[[str], None],
     ):
         """Start.
@@ -75,7 +77,7 @@ class LiveStitcher:
             Called in the composing thread with the compositor, the pictures, the older stamp, and
             the ages of those pictures that are not live, s.
         changed
-            Called when there is a new compositor.
+            Called with the stamp, ns, of the pictures from which a new compositor is in use.
         warn
             Called with a sentence about what did not work.
         """
@@ -83,6 +85,7 @@ class LiveStitcher:
         self.pairing = FramePairing(settings.cameras, round(settings.max_pair_skew_s * 1e9))
         self.rates = {camera: Rate() for camera in settings.cameras}
         self._preparation = Preparation(self.stitcher, settings, changed, warn)
+        self.broken = 0
         self._publish, self._warn = publish, warn
         self._lock = Lock()
         self._last = {camera: _Last(None, monotonic()) for camera in settings.cameras}
@@ -101,6 +104,14 @@ class LiveStitcher:
         if self.compositor is None:
             return []
         return self.stitcher.in_use(self._preparation.settings)
+
+    @property
+    def trouble(self) -> str:
+        """Why no newer panorama can be laid out; '' if there is nothing wrong."""
+        missing = [camera for camera, last in self._last.items() if last.image is None]
+        if self.compositor is None and missing:
+            return f'waiting for pictures of {", ".join(missing)}'
+        return self._preparation.trouble
 
     @property
     def unpaired_s(self) -> float:
@@ -142,7 +153,7 @@ class LiveStitcher:
     def place(
         self, camera: str, source: Lens | Surface, surface: Surface, interpolation: str = 'linear'
     ) -> None:
-        """Say what a camera's pictures show."""
+        """Say what a camera's pictures show; parameters and errors as `Stitcher.place`."""
         with self._lock:
             if self.stitcher.place(camera, source, surface, interpolation):
                 self.pairing.clear()
@@ -150,15 +161,7 @@ class LiveStitcher:
                 self._preparation.renew(forget=True)
 
     def apply(self, settings: PanoramaOutputSettings) -> None:
-        """Use other settings from the next frames on.
-
-        Raises
-        ------
-        OverlapError
-            If they do not fit the cameras.
-        """
-        if self.stitcher.is_complete:
-            self.stitcher.in_use(settings)
+        """Use other settings from the next frames on."""
         self._preparation.settings = settings
         self.pairing.max_skew_ns = round(settings.max_pair_skew_s * 1e9)
         self._preparation.renew(forget=False)
@@ -185,18 +188,23 @@ class LiveStitcher:
         self._composing.put(_Group(images, stamp_ns, ages_s))
 
     def _compose(self, group: _Group) -> None:
-        if not group.ages_s:
-            self._preparation.remember(group.images)
-        self._preparation.go_on(group.images, is_live=not group.ages_s)
-        if self.compositor is None:
-            return
-        images = [
-            self._dimmed(camera, image) if camera in group.ages_s else image
-            for camera, image in zip(self.stitcher.cameras, group.images, strict=True)
-        ]
+        is_live = not group.ages_s
         try:
+            # They may have waited while a camera became another one.
+            for camera, image in zip(self.stitcher.cameras, group.images, strict=True):
+                self.stitcher.check(camera, image)
+            if is_live:
+                self._preparation.remember(group.images, group.stamp_ns)
+            self._preparation.go_on(group.images, group.stamp_ns, is_live=is_live)
+            if self.compositor is None:
+                return
+            images = [
+                self._dimmed(camera, image) if camera in group.ages_s else image
+                for camera, image in zip(self.stitcher.cameras, group.images, strict=True)
+            ]
             self._publish(self.compositor, images, group.stamp_ns, group.ages_s)
         except FisheyeError as error:
+            self.broken += 1
             self._warn(f'a pair of frames was dropped: {error}')
 
     def _dimmed(self, camera: str, image: np.ndarray) -> np.ndarray:

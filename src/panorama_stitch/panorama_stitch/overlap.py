@@ -14,7 +14,7 @@ import numpy as np
 from fisheye_geometry.errors import OverlapError
 from fisheye_geometry.surface import Surface
 from panorama_stitch import paper
-from panorama_stitch.overlap_result import Overlap, side_by_side
+from panorama_stitch.overlap_result import Overlap, apart_rad, side_by_side
 from panorama_stitch.overlap_settings import METHODS, OverlapSettings
 from panorama_stitch.particles import Particle
 from panorama_stitch.registration import Registration, Search, fit_at, register
@@ -231,10 +231,8 @@ class _Measurement:
     def _where(self, x_px: float) -> str:
         """Offset of a facing half in words: px of the frame, and degrees where there are any."""
         text = f'{x_px + self._half_start:.1f} px'
-        if not self._surfaces[0].turns_are_shifts:
-            return text
-        turned = (x_px + self._half_start - self._level_x) / self._surfaces[0].focal_px
-        return f'{text} ({degrees(turned):.2f} degrees)'
+        apart = apart_rad(x_px + self._half_start, *self._surfaces)
+        return text if isnan(apart) else f'{text} ({degrees(apart):.2f} degrees)'
 
 
 def _grey(picture: np.ndarray) -> np.ndarray:

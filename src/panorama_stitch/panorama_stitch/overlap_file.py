@@ -1,6 +1,7 @@
 """The overlap file: what was measured once, kept for the next start, valid for one rig only."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from math import degrees, inf, radians
 from pathlib import Path
 
@@ -8,7 +9,8 @@ from fisheye_geometry.errors import CameraFileError
 from fisheye_geometry.remap import Turn
 from fisheye_geometry.surface import Surface
 from fisheye_geometry.yaml_file import is_number, read_mapping, shown, write_mapping
-from panorama_stitch.overlap import METHODS, Overlap
+from panorama_stitch.overlap_result import Overlap
+from panorama_stitch.overlap_settings import METHODS
 
 VERSION = 1
 _SIZE_KEYS = ('width', 'height')
@@ -56,8 +58,8 @@ def write_overlaps(
 
 def read_overlaps(
     path: str | Path, cameras: Sequence[str], surfaces: Sequence[Surface]
-) -> list[Overlap]:
-    """Read the overlaps of a rig: no particles, the rest as it was measured.
+) -> list[Overlap] | None:
+    """Read the overlaps of a rig: no particles, the rest as it was measured; None without a file.
 
     Raises
     ------
@@ -65,6 +67,10 @@ def read_overlaps(
         If the file cannot be read, lacks something, or was measured on another rig; the sentence
         names the file and what does not fit.
     """
+    with suppress(OSError):
+        # What cannot even be looked at is no missing file; reading it says why.
+        if not path or not Path(path).exists():
+            return None
     entries = read_mapping(path)
     try:
         if entries.get('version') != VERSION:

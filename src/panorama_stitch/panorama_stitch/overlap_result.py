@@ -15,7 +15,7 @@ class Overlap:
     Attributes
     ----------
     method
-        What decided, one of `METHODS`.
+        What decided, one of `METHODS`; 'manual' where a person did, '' where nothing did yet.
     found
         False: no common scene; the offset puts the pictures side by side.
     offset_x_px, offset_y_px
@@ -36,6 +36,8 @@ class Overlap:
         Indices of the matched pair, -1 where none matched.
     message
         One sentence for a person.
+    stamp_ns
+        When the newest pictures were taken that it was measured on; 0 if it was not measured now.
     """
 
     method: str
@@ -51,6 +53,27 @@ class Overlap:
     left_match: int = -1
     right_match: int = -1
     message: str = ''
+    stamp_ns: int = 0
+
+
+def apart_rad(offset_x_px: float, left: Surface, right: Surface) -> float:
+    """Give the angle between the optical axes of two neighbours at an offset.
+
+    Parameters
+    ----------
+    offset_x_px
+        Where the right picture's left edge lies in the left picture.
+    left, right
+        What the pictures are on, with one focal length.
+
+    Returns
+    -------
+    float
+        rad; NaN on a rectilinear surface, where an offset is no angle.
+    """
+    if not left.turns_are_shifts:
+        return nan
+    return (offset_x_px + right.center_x_px - left.center_x_px) / left.focal_px
 
 
 def side_by_side(surface_left: Surface, method: str, message: str) -> Overlap:

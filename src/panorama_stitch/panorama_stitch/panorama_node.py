@@ -39,9 +39,12 @@ class PanoramaNode(PanoramaBase):
         super().destroy_node()
 
     def _apply(self, settings: PanoramaSettings) -> None:
-        for eye in getattr(self, '_eyes', ()):
-            eye.place(settings)
+        eyes = getattr(self, '_eyes', ())
+        for eye in eyes:
+            eye.check(settings)  # all or none: nothing is refused half-way
         super()._apply(settings)
+        for eye in eyes:
+            eye.place(settings)
 
     def _report(self, report) -> None:
         super()._report(report)
@@ -56,6 +59,11 @@ class _Eye:
 
     def __init__(self, node: PanoramaNode, name: str):
         self._node, self._name = node, name
+
+    def check(self, settings: PanoramaSettings) -> None:
+        """Raise a `GeometryError` if the camera's pictures cannot be shown like that."""
+        if self.lens:
+            settings.surface_of(self.lens)
 
     def place(self, settings: PanoramaSettings) -> None:
         """Say what the camera's pictures show, if it is known."""

@@ -1,19 +1,18 @@
 """Preparation: overlaps measured and compositors built, while frames go on with the former."""
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import Future
-from pathlib import Path
+from dataclasses import replace
 from threading import Lock
 from time import monotonic
-
-import numpy as np
+from typing import NamedTuple
 
 from fisheye_geometry.background import Background
 from fisheye_geometry.errors import FisheyeError, OverlapError
 from panorama_stitch.compositor import Compositor
-from panorama_stitch.overlap import Overlap
 from panorama_stitch.overlap_file import read_overlaps, write_overlaps
+from panorama_stitch.overlap_result import Overlap
 from panorama_stitch.settings import PanoramaOutputSettings
 from panorama_stitch.stitcher import Group, Stitcher
 
@@ -24,6 +23,13 @@ _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 2.0, 60.0
 """Between two tries to find an overlap."""
 
 
+class _Remembered(NamedTuple):
+    """Pictures of all cameras, and when the oldest of them was taken."""
+
+    images: Group
+    stamp_ns: int
+
+
 class Preparation:
     """Keeps the compositor fit for the cameras, the settings and the overlaps.
 
@@ -32,14 +38,16 @@ class Preparation:
     compositor : Compositor or None
         In use now.
     settings : PanoramaOutputSettings
-        The compositor follows when they are `changed`.
+        Used the next time; `renew` says that it is due.
+    trouble : str
+        Why there is no newer compositor; '' if there is nothing wrong.
     """
 
     def __init__(
         self,
         stitcher: Stitcher,
         settings: PanoramaOutputSettings,
-        changed: Callable[[], None],
+        changed: Callable[[int], None],
         warn: Callable[[str], None],
     ):
         """Start idle.
@@ -51,23 +59,24 @@ class Preparation:
         settings
             To begin with.
         changed
-            Called when there is a new compositor.
+            Called with the stamp, ns, of the pictures from which a new compositor is in use.
         warn
             Called with a sentence about what did not work.
         """
         self.compositor: Compositor | None = None
         self.settings = settings
+        self.trouble = ''
         self._stitcher = stitcher
         self._changed, self._warn = changed, warn
         self._background = Background(self._failed)
         self._lock = Lock()
-        self._recent: deque[Group] = deque(maxlen=_REMEMBERED)
+        self._recent: deque[_Remembered] = deque(maxlen=_REMEMBERED)
         self._remembered_s = 0.0
         self._due_s = 0.0
         self._pause_s = _FIRST_PAUSE_S
         self._job: Future | None = None
 
-    def remember(self, images: Group) -> None:
+    def remember(self, images: Group, stamp_ns: int) -> None:
         """Take a group into account the next time that an overlap is measured."""
         now = monotonic()
         with self._lock:
@@ -76,7 +85,7 @@ class Preparation:
                 self._due_s = 0.0
             if is_first or now - self._remembered_s >= _BETWEEN_REMEMBERED_S:
                 self._remembered_s = now
-                self._recent.append(images)
+                self._recent.append(_Remembered(images, stamp_ns))
 
     def renew(self, *, forget: bool) -> None:
         """Have a new compositor built soon; `forget` what the cameras showed so far."""
@@ -85,21 +94,28 @@ class Preparation:
                 self._recent.clear()
         self._due_s = 0.0
 
-    def go_on(self, images: Group, *, is_live: bool) -> None:
+    def go_on(self, images: Group, stamp_ns: int, *, is_live: bool) -> None:
         """Start what is due, unless something is in work; `is_live`: no picture is stale."""
         busy = self._job is not None and not self._job.done()
         if not busy and self._stitcher.is_complete and monotonic() >= self._due_s:
             self._due_s = float('inf')
-            self._job = self._background.do(self._prepare, images, is_live)
+            self._job = self._background.do(self._prepare, _Remembered(images, stamp_ns), is_live)
 
     def calibrate(self, method: str, save: bool) -> Future:
         """Measure the overlaps anew on the groups that are remembered.
+
+        Parameters
+        ----------
+        method
+            One of `METHODS`; '' for that of the settings.
+        save
+            Also write the result to the overlap file, if all were found.
 
         Returns
         -------
         Future
             Of a list of `Overlap`. Where no overlap is found, one that was found before stays in
-            use.
+            use. With a `FisheyeError` nothing has changed.
         """
         return self._background.do(self._calibrate, method, save)
 
@@ -108,63 +124,71 @@ class Preparation:
         self._background.stop()
 
     def _failed(self, error: FisheyeError) -> None:
-        self._warn(str(error))
-        if self.compositor is None:
-            self._due_s = monotonic() + _FIRST_PAUSE_S
+        self.trouble = str(error)
+        self._warn(self.trouble)
+        self._due_s = monotonic() + _FIRST_PAUSE_S
 
-    def _prepare(self, images: Group, is_live: bool) -> None:
+    def _prepare(self, newest: _Remembered, is_live: bool) -> None:
         """Find overlaps if there are none, and build the compositor that uses them."""
         stitcher, settings = self._stitcher, self.settings
-        if stitcher.overlaps is None and Path(settings.overlap_file).is_file():
+        if stitcher.overlaps is None:
             self._read(settings.overlap_file)
         found = stitcher.overlaps and all(overlap.found for overlap in stitcher.overlaps)
         groups = self._groups()
         if not found and settings.auto_calibrate and groups:
-            stitcher.overlaps = stitcher.measure(groups, settings, settings.method)
-            if not all(overlap.found for overlap in stitcher.overlaps):
+            surfaces = stitcher.surfaces
+            overlaps = self._measured(groups, settings.method)
+            if not stitcher.adopt(overlaps, surfaces):
+                self._due_s = 0.0
+                return
+            if not all(overlap.found for overlap in overlaps):
                 self._due_s = monotonic() + self._pause_s
                 self._pause_s = min(2 * self._pause_s, _LONGEST_PAUSE_S)
         elif not found and settings.auto_calibrate and is_live:
             # What was remembered was forgotten a moment ago; the next group can be measured.
             self._due_s = 0.0
             return
-        self._use(images)
+        self._use(newest)
 
     def _calibrate(self, method: str, save: bool) -> list[Overlap]:
-        if not self._stitcher.is_complete:
+        stitcher, settings = self._stitcher, self.settings
+        if not stitcher.is_complete:
             raise OverlapError('it is not known yet what every camera sees; are all running?')
-        groups = self._groups()
-        measured = self._stitcher.measure(groups, self.settings, method or self.settings.method)
-        former = self._stitcher.overlaps or measured
-        self._stitcher.overlaps = [
+        if save and not settings.overlap_file:
+            raise OverlapError('overlap_file is empty; expected the file to save the overlap in')
+        groups, surfaces = self._groups(), stitcher.surfaces
+        measured = self._measured(groups, method or settings.method)
+        former = stitcher.overlaps or measured
+        overlaps = [
             new if new.found or not old.found else old
             for new, old in zip(measured, former, strict=True)
         ]
+        if save and all(overlap.found for overlap in measured):
+            write_overlaps(settings.overlap_file, stitcher.cameras, surfaces, overlaps)
+        if not stitcher.adopt(overlaps, surfaces):
+            raise OverlapError('the cameras changed meanwhile; expected them to stay as they are')
         self._use(groups[-1])
-        if save:
-            self._write(measured)
         return measured
 
-    def _groups(self) -> list[Group]:
+    def _groups(self) -> list[_Remembered]:
         with self._lock:
             return list(self._recent)
 
-    def _use(self, images: Sequence[np.ndarray]) -> None:
-        self.compositor = self._stitcher.compositor(self.settings, images)
-        self._changed()
+    def _measured(self, groups: list[_Remembered], method: str) -> list[Overlap]:
+        pictures = [group.images for group in groups]
+        overlaps = self._stitcher.measure(pictures, self.settings, method)
+        return [replace(overlap, stamp_ns=groups[-1].stamp_ns) for overlap in overlaps]
+
+    def _use(self, newest: _Remembered) -> None:
+        self.compositor = self._stitcher.compositor(self.settings, newest.images)
+        self.trouble = ''
+        self._changed(newest.stamp_ns)
 
     def _read(self, path: str) -> None:
+        stitcher = self._stitcher
+        surfaces = stitcher.surfaces
         try:
-            self._stitcher.overlaps = read_overlaps(
-                path, self._stitcher.cameras, self._stitcher.surfaces
-            )
+            if overlaps := read_overlaps(path, stitcher.cameras, surfaces):
+                stitcher.adopt(overlaps, surfaces)
         except FisheyeError as error:
             self._warn(f'{error}; the overlap is measured instead')
-
-    def _write(self, overlaps: list[Overlap]) -> None:
-        path = self.settings.overlap_file
-        if not path:
-            raise OverlapError(
-                'the overlap was measured and is in use, but not saved: overlap_file is empty'
-            )
-        write_overlaps(path, self._stitcher.cameras, self._stitcher.surfaces, overlaps)

@@ -1,14 +1,19 @@
 """Settings of the two nodes that make panoramas: the only place with their defaults."""
 
+import re
 from dataclasses import dataclass
-from math import nan
+from math import isnan, nan
 
 from fisheye_capture.settings import FrameSettings
+from fisheye_geometry.errors import SettingError
 from fisheye_geometry.settings import setting
 from fisheye_undistort.settings import SurfaceSettings
 from panorama_stitch.compositor import BLENDS
 from panorama_stitch.layout import CROPS
-from panorama_stitch.overlap import OverlapSettings
+from panorama_stitch.overlap_settings import OverlapSettings
+
+_NAME = re.compile(r'[A-Za-z]\w*(/[A-Za-z]\w*)*', re.ASCII)
+"""Of a camera: it is a namespace."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +82,26 @@ class PanoramaOutputSettings(OverlapSettings):
     jpeg_quality: int = setting(
         80, 'Quality of the compressed panorama.', minimum=1, maximum=100, live=True
     )
+
+    def __post_init__(self):
+        """Refuse names and numbers that do not belong together."""
+        cameras, pairs = self.cameras, len(self.cameras) - 1
+        if pairs < 1 or len(set(cameras)) != len(cameras):
+            raise SettingError(
+                f'cameras is {list(cameras)}; expected at least two different names'
+            )
+        for name in cameras:
+            if not _NAME.fullmatch(name):
+                raise SettingError(
+                    f"cameras has '{name}'; expected a letter, then letters, digits or _"
+                )
+        for name in ('offset_x_px', 'offset_y_px'):
+            values = getattr(self, name)
+            if len(values) != pairs and not all(map(isnan, values)):
+                raise SettingError(
+                    f'{name} has {len(values)} numbers; expected {pairs}, one for each '
+                    'neighbouring pair'
+                )
 
 
 @dataclass(frozen=True)

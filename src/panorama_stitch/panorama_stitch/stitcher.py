@@ -2,7 +2,9 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import isnan
+from math import isnan, nan
+from threading import Lock
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,7 +15,8 @@ from fisheye_geometry.surface import Surface
 from panorama_stitch.compositor import BLENDS, Compositor
 from panorama_stitch.gain import GainCompensation
 from panorama_stitch.layout import lay_out
-from panorama_stitch.overlap import Overlap, measure_overlap
+from panorama_stitch.overlap import measure_overlap
+from panorama_stitch.overlap_result import Overlap, side_by_side
 from panorama_stitch.seam import settle_seams
 from panorama_stitch.settings import PanoramaOutputSettings
 from panorama_stitch.view import View
@@ -36,7 +39,8 @@ class Stitcher:
     def __init__(self, cameras: Sequence[str]):
         self.cameras = tuple(cameras)
         self.overlaps: list[Overlap] | None = None
-        self._places: dict[int, tuple[Lens | Surface, Surface, str]] = {}
+        self._places: dict[int, _Place] = {}
+        self._lock = Lock()
 
     @property
     def is_complete(self) -> bool:
@@ -46,7 +50,7 @@ class Stitcher:
     @property
     def surfaces(self) -> list[Surface]:
         """What the corrected pictures show, all with the focal length of the first."""
-        return [view.surface for view in self._views()]
+        return [surface for _, surface in sorted(_with_one_focal(self._places).items())]
 
     def place(
         self, camera: str, source: Lens | Surface, surface: Surface, interpolation: str = 'linear'
@@ -54,16 +58,31 @@ class Stitcher:
         """Say what a camera's pictures show; whether that is news.
 
         Overlaps that were measured on other surfaces are forgotten.
+
+        Raises
+        ------
+        GeometryError
+            If there is no surface with the focal length of the first camera; the former place
+            stays.
         """
-        place = source, surface, interpolation
-        index = self.cameras.index(camera)
+        index, place = self.cameras.index(camera), _Place(source, surface, interpolation)
         former = self._places.get(index)
         if place == former:
             return False
-        self._places[index] = place
-        if former and former[1] != surface:
-            self.overlaps = None
+        _with_one_focal({**self._places, index: place})
+        with self._lock:
+            self._places[index] = place
+            if former and former.surface != surface:
+                self.overlaps = None
         return True
+
+    def adopt(self, overlaps: list[Overlap], surfaces: list[Surface]) -> bool:
+        """Use overlaps if the surfaces that they were measured on are still in use; whether so."""
+        with self._lock:
+            is_current = surfaces == self.surfaces
+            if is_current:
+                self.overlaps = overlaps
+        return is_current
 
     def knows(self, camera: str) -> bool:
         """Whether it is known what a camera sees."""
@@ -72,29 +91,40 @@ class Stitcher:
     def check(self, camera: str, image: np.ndarray) -> None:
         """Raise an `ImageFormatError` for a picture of another size than the camera's."""
         place = self._places.get(self.cameras.index(camera))
-        if place and image.shape[:2] != (place[0].height, place[0].width):
+        if place and image.shape[:2] != (place.source.height, place.source.width):
             raise ImageFormatError(
                 f'the picture of {camera} has {image.shape[1]}x{image.shape[0]} px; '
-                f'expected {place[0].width}x{place[0].height} px'
+                f'expected {place.source.width}x{place.source.height} px'
             )
 
     def black(self, camera: str, channels: tuple[int, ...]) -> np.ndarray:
         """Give a picture for a camera that never gave one, (height, width, *channels) uint8."""
-        source = self._places[self.cameras.index(camera)][0]
+        source = self._places[self.cameras.index(camera)].source
         return np.zeros((source.height, source.width, *channels), np.uint8)
 
     def measure(
         self, groups: Sequence[Group], settings: PanoramaOutputSettings, method: str
     ) -> list[Overlap]:
-        """Measure the overlap of each neighbouring pair on groups of pictures.
+        """Measure the overlap of each neighbouring pair.
+
+        Parameters
+        ----------
+        groups
+            Pictures (height, width[, channels]) uint8, one of each camera in each group.
+        settings
+            How to measure.
+        method
+            One of `METHODS`, in place of the settings' own.
 
         Raises
         ------
         OverlapError
-            If there is no group, or the pictures cannot be what the cameras are known to give.
+            If there is no group.
+        ImageFormatError
+            If the pictures cannot be what the cameras are known to give.
         """
         if not groups:
-            raise OverlapError('no pair of frames has come yet; are both cameras running?')
+            raise OverlapError('no pair of frames has come yet; are all cameras running?')
         views = self._views(groups[0])
         overlaps = []
         for i in range(len(views) - 1):
@@ -110,23 +140,35 @@ class Stitcher:
         return overlaps
 
     def in_use(self, settings: PanoramaOutputSettings) -> list[Overlap]:
-        """Give the overlaps with those set by hand in place of the measured ones.
-
-        Raises
-        ------
-        OverlapError
-            If a number was set by hand for a pair that does not exist.
-        """
+        """Give the overlaps, with what was set by hand in place of what was measured."""
         pairs = len(self.cameras) - 1
         by_hand = [
-            _one_per_pair(name, getattr(settings, name), pairs)
-            for name in ('offset_x_px', 'offset_y_px')
+            [nan] * pairs if all(map(isnan, values)) else values
+            for values in (settings.offset_x_px, settings.offset_y_px)
         ]
-        measured = self.overlaps or [side_by_side(s) for s in self.surfaces[:-1]]
+        measured = self.overlaps or [
+            side_by_side(surface, '', 'not measured yet') for surface in self.surfaces[:-1]
+        ]
         return [_set_by_hand(*entry) for entry in zip(measured, *by_hand, strict=True)]
 
     def compositor(self, settings: PanoramaOutputSettings, group: Group) -> Compositor:
-        """Build what composes panoramas; `group` shows where pictures are black for good."""
+        """Build what composes panoramas.
+
+        Parameters
+        ----------
+        settings
+            How to compose.
+        group
+            A picture of each camera, (height, width[, channels]) uint8: they show where corrected
+            pictures are black for good, where the seams fit best, and how bright they are.
+
+        Raises
+        ------
+        ImageFormatError
+            If a picture cannot be what its camera is known to give.
+        GeometryError
+            If the surfaces cannot be joined.
+        """
         overlaps = self.in_use(settings)
         turns = [LEVEL, *(overlap.turn for overlap in overlaps)]
         views = [
@@ -144,35 +186,36 @@ class Stitcher:
         gain = GainCompensation(layout, views, group) if settings.gain_compensation else None
         return Compositor(layout, views, settings.blend, gain)
 
-    def _views(self, group: Group | None = None) -> list[View]:
-        focal_px = self._places[0][1].focal_px
+    def _views(self, group: Group) -> list[View]:
         views = []
-        for index in range(len(self.cameras)):
-            source, surface, interpolation = self._places[index]
-            if surface.focal_px != focal_px:
-                surface = surface.with_focal(focal_px)
+        for index, surface in sorted(_with_one_focal(self._places).items()):
+            picture, place = group[index], self._places[index]
+            self.check(self.cameras[index], picture)
             seen = None
-            if group is not None:
-                self.check(self.cameras[index], group[index])
-            if group is not None and isinstance(source, Surface):
-                seen = group[index] > 0 if group[index].ndim == 2 else group[index].any(axis=2)
-            views.append(View(source, surface, interpolation, seen=seen))
+            if isinstance(place.source, Surface):
+                seen = picture > 0 if picture.ndim == 2 else picture.any(axis=2)
+            views.append(View(place.source, surface, place.interpolation, seen=seen))
         return views
 
 
-def side_by_side(left: Surface) -> Overlap:
-    """Give the answer where nothing was measured: both frames whole, the right beside the left."""
-    return Overlap(method='', found=False, offset_x_px=float(left.width), offset_y_px=0.0)
+class _Place(NamedTuple):
+    """What a camera's pictures show, and how they are drawn on which surface."""
+
+    source: Lens | Surface
+    surface: Surface
+    interpolation: str
 
 
-def _one_per_pair(name: str, values: Sequence[float], pairs: int) -> Sequence[float]:
-    if all(isnan(value) for value in values):
-        return [float('nan')] * pairs
-    if len(values) != pairs:
-        raise OverlapError(
-            f'{name} has {len(values)} numbers; expected {pairs}, one for each neighbouring pair'
-        )
-    return values
+def _with_one_focal(places: dict[int, _Place]) -> dict[int, Surface]:
+    """Give the surface of each place, enlarged or reduced to the focal length of the first."""
+    surfaces = {index: place.surface for index, place in places.items()}
+    if 0 not in surfaces:
+        return surfaces
+    focal_px = surfaces[0].focal_px
+    return {
+        index: surface if surface.focal_px == focal_px else surface.with_focal(focal_px)
+        for index, surface in surfaces.items()
+    }
 
 
 def _set_by_hand(measured: Overlap, x_px: float, y_px: float) -> Overlap:

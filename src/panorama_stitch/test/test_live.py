@@ -32,10 +32,10 @@ class Line:
     """A live stitcher, what it published, and a hand that feeds it."""
 
     def __init__(self, settings=SETTINGS):
-        self.published, self.warnings = [], []
+        self.published, self.warnings, self.changed = [], [], []
         self.news = threading.Event()
         self.live = LiveStitcher(
-            settings, publish=self._publish, changed=lambda: None, warn=self.warnings.append
+            settings, publish=self._publish, changed=self.changed.append, warn=self.warnings.append
         )
         for camera in settings.cameras:
             self.live.place(camera, LENS, settings.surface_of(LENS))
@@ -179,8 +179,31 @@ def test_what_cannot_be_done_is_said(make_line, pictures, tmp_path):
         line.live.take('right', 1, np.zeros((10, 10, 3), np.uint8))
     (tmp_path / 'file').write_text('')
     line.live.apply(replace(SETTINGS, overlap_file=str(tmp_path / 'file' / 'overlap.yaml')))
+    before = in_use(line)
     with pytest.raises(CameraFileError, match='cannot be written'):
         line.live.calibrate('', save=True).result(DEADLINE_S)
+    assert in_use(line) is before, 'what was in use stays in use'
+
+
+def test_what_was_not_found_is_not_saved(make_line, pictures, tmp_path):
+    path = tmp_path / 'overlap.yaml'
+    line = make_line(replace(SETTINGS, overlap_file=str(path)))
+    dark = {camera: np.zeros_like(picture) for camera, picture in pictures.items()}
+    line.feed(dark, lambda: line.published, 'a dark panorama')
+    line.live.calibrate('', save=True).result(DEADLINE_S)
+    assert not path.exists()
+
+
+def test_a_file_that_cannot_even_be_looked_at_is_said(make_line, pictures):
+    line = make_line(replace(SETTINGS, overlap_file='x' * 5000))
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    assert 'cannot be read' in line.warnings[0]
+
+
+def test_it_is_said_from_which_pictures_on_what_is_in_use(make_line, pictures):
+    line = make_line()
+    line.feed(pictures, lambda: line.changed, 'an overlap')
+    assert 0 < in_use(line).stamp_ns <= line.changed[0] <= line.stamp_ns
 
 
 def test_a_setting_applies_to_the_next_frames(make_line, pictures):
@@ -204,3 +227,30 @@ def test_another_lens_is_measured_anew(make_line, pictures):
     count = len(line.published)
     line.feed(shrunk, lambda: len(line.published) > count + 3, 'panoramas of the other lens')
     assert in_use(line).offset_x_px == pytest.approx(former.offset_x_px / 2, abs=1.0)
+
+
+def test_pictures_that_waited_while_the_lens_changed_stop_nothing(make_line, pictures):
+    line = make_line()
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    composing, go_on = threading.Event(), threading.Event()
+    publish = line.live._publish
+
+    def publish_late(*arguments):
+        composing.set()
+        go_on.wait(DEADLINE_S)
+        publish(*arguments)
+
+    line.live._publish = publish_late
+    line.feed(pictures, composing.is_set, 'a panorama in work')
+    for _ in range(3):
+        line.stamp_ns += STEP_NS
+        for camera, picture in pictures.items():
+            line.live.take(camera, line.stamp_ns, picture)
+    small = synthetic_lens(160, 120, np.radians(170))
+    shrunk = {name: cv2.resize(picture, (160, 120)) for name, picture in pictures.items()}
+    for camera in shrunk:
+        line.live.place(camera, small, SETTINGS.surface_of(small))
+    go_on.set()
+    count = len(line.published)
+    line.feed(shrunk, lambda: len(line.published) > count + 3, 'panoramas of the other lens')
+    assert line.live.trouble == ''

@@ -8,8 +8,8 @@ import yaml
 from fisheye_geometry.errors import CameraFileError
 from fisheye_geometry.remap import Turn
 from fisheye_geometry.surface import Surface
-from panorama_stitch.overlap import Overlap
 from panorama_stitch.overlap_file import read_overlaps, write_overlaps
+from panorama_stitch.overlap_result import Overlap
 from panorama_stitch.particles import Particle
 
 CAMERAS = ('left', 'middle', 'right')
@@ -106,9 +106,14 @@ def test_a_broken_file_is_refused_with_a_sentence(path, change, sentence):
         read_overlaps(path, CAMERAS, SURFACES)
 
 
-def test_a_missing_file_is_told(tmp_path):
-    with pytest.raises(CameraFileError, match='cannot be read'):
-        read_overlaps(tmp_path / 'none.yaml', CAMERAS, SURFACES)
+def test_a_missing_file_is_none(tmp_path):
+    assert read_overlaps(tmp_path / 'none.yaml', CAMERAS, SURFACES) is None
+    assert read_overlaps('', CAMERAS, SURFACES) is None
+
+
+def test_a_file_that_cannot_be_looked_at_is_told():
+    with pytest.raises(CameraFileError, match='cannot be read: File name too long'):
+        read_overlaps('x' * 5000, CAMERAS, SURFACES)
 
 
 def test_nothing_but_the_file_is_left_behind(path):

@@ -8,7 +8,7 @@ import pytest
 
 from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens
-from fisheye_geometry.errors import OverlapError
+from fisheye_geometry.errors import GeometryError, OverlapError
 from fisheye_geometry.image_circle import ImageCircle
 from fisheye_geometry.remap import Turn
 from panorama_stitch.settings import PanoramaSettings
@@ -64,8 +64,6 @@ def test_an_offset_set_by_hand_wins_and_nan_gives_the_measured_one_back(pictures
     assert (by_hand.offset_x_px, by_hand.method) == (500.0, 'manual')
     assert by_hand.offset_y_px == stitcher.overlaps[0].offset_y_px
     assert stitcher.in_use(SETTINGS) == stitcher.overlaps
-    with pytest.raises(OverlapError, match='offset_x_px has 2 numbers; expected 1'):
-        stitcher.in_use(replace(SETTINGS, offset_x_px=(500.0, 2.0)))
 
 
 def test_another_surface_makes_the_overlap_void(pictures):
@@ -75,6 +73,25 @@ def test_another_surface_makes_the_overlap_void(pictures):
     assert stitcher.overlaps
     assert stitcher.place('left', LENS, replace(SETTINGS, hfov_deg=150.0).surface_of(LENS))
     assert stitcher.overlaps is None
+
+
+def test_what_was_measured_on_other_surfaces_is_not_taken(pictures):
+    stitcher = stitcher_of()
+    surfaces = stitcher.surfaces
+    overlaps = stitcher.measure([pictures], SETTINGS, 'particles')
+    stitcher.place('left', LENS, replace(SETTINGS, hfov_deg=150.0).surface_of(LENS))
+    assert not stitcher.adopt(overlaps, surfaces)
+    assert stitcher.overlaps is None
+    assert stitcher.adopt(overlaps, stitcher.surfaces)
+
+
+def test_a_surface_that_would_become_absurd_is_refused():
+    stitcher = stitcher_of()
+    before = stitcher.surfaces
+    tiny = replace(before[0], focal_px=before[0].focal_px / 1000)
+    with pytest.raises(GeometryError):
+        stitcher.place('right', tiny, tiny)
+    assert stitcher.surfaces == before
 
 
 def test_nothing_to_measure_on_is_said(pictures):
