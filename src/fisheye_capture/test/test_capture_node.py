@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from exif import turned
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -181,6 +182,15 @@ def test_the_jpeg_of_a_device_is_decoded_for_those_who_want_pixels(ros, jpeg_dev
     ros.start(source=jpeg_device)
     image, encoding = to_array(ros.hear('/left/image_raw'))
     assert (encoding, image.shape, image[0, 0, 0]) == ('bgr8', (24, 32, 3), 90)
+
+
+def test_a_device_held_on_its_side_gives_pictures_as_its_sensor_does(
+    ros, jpeg_device, monkeypatch
+):
+    exif = np.frombuffer(turned(JpegDevice.picture.tobytes()), np.uint8)
+    monkeypatch.setattr(JpegDevice, 'picture', exif)
+    ros.start(source=jpeg_device)
+    assert to_array(ros.hear('/left/image_raw'))[0].shape == (24, 32, 3)
 
 
 def test_a_picture_that_cannot_be_decoded_is_dropped_and_counted(ros, jpeg_device, monkeypatch):

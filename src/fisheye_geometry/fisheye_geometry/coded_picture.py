@@ -56,21 +56,25 @@ def whole_jpeg(coded: np.ndarray) -> np.ndarray | None:
 def decoded(coded: np.ndarray, *, grey: bool = False) -> np.ndarray:
     """Decode a JPEG or PNG, (n,) uint8, to (height, width, 3) BGR or (height, width), uint8.
 
+    The pixels come as the sensor gave them, whatever EXIF says of the camera's orientation: a
+    calibration knows nothing of a turned picture.
+
     Raises
     ------
     ImageFormatError
-        If it is no picture, or one that is too large.
+        If it is no picture, one that is too large, or not of the size that its head claims.
     """
     width, height = size_of(coded)
     if not 1 <= width * height <= _MAX_PIXELS:
         raise ImageFormatError(
             f'a picture of {width}x{height} px; expected up to {_MAX_PIXELS / 1e6:g} million px'
         )
+    kind = cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR
     try:
-        image = cv2.imdecode(coded, cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR)
+        image = cv2.imdecode(coded, kind | cv2.IMREAD_IGNORE_ORIENTATION)
     except cv2.error:
         image = None
-    if image is None:
+    if image is None or image.shape[:2] != (height, width):
         raise ImageFormatError(f'a broken picture of {width}x{height} px ({coded.size} bytes)')
     return image
 

@@ -3,6 +3,7 @@
 import cv2
 import numpy as np
 import pytest
+from exif import turned
 
 from fisheye_geometry.coded_picture import decoded, size_of, whole_jpeg
 from fisheye_geometry.errors import ImageFormatError
@@ -32,6 +33,26 @@ def test_what_ends_too_early_or_is_something_else_is_refused(suffix):
     for count in range(0, 24):
         with pytest.raises(ImageFormatError, match=f'{count} bytes are no picture; expected JPEG'):
             size_of(coded[:count])
+
+
+@pytest.mark.parametrize('grey', [False, True])
+def test_pixels_come_as_the_sensor_gave_them_whatever_exif_says(grey):
+    coded = cv2.imencode('.jpg', PICTURE)[1]
+    exif = np.frombuffer(turned(coded.tobytes()), np.uint8)
+    assert cv2.imdecode(exif, cv2.IMREAD_COLOR).shape[:2] == (53, 37), 'others turn it'
+    assert size_of(exif) == (53, 37)
+    np.testing.assert_array_equal(decoded(exif, grey=grey), decoded(coded, grey=grey))
+
+
+def test_a_picture_that_is_not_as_large_as_it_claims_is_refused():
+    coded = cv2.imencode('.jpg', PICTURE)[1].tobytes()
+    # Decoders know that a restart marker has no length; what is skipped by one is the picture.
+    claim = b'\xff\xc0\0\x0b\x08\0\x08\0\x10\x01\x01\x11\0'
+    hidden = b'\xff\xd0' + len(coded).to_bytes(2, 'big') + coded[2:]
+    false = np.frombuffer(coded[:2] + hidden + claim, np.uint8)
+    assert size_of(false) == (16, 8)
+    with pytest.raises(ImageFormatError, match='a broken picture of 16x8 px'):
+        decoded(false)
 
 
 def test_a_jpeg_ends_where_it_says():

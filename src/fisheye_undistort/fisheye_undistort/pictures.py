@@ -14,6 +14,8 @@ HALVES = ('left', 'right')
 
 _PICTURES = ('.png', '.jpg', '.jpeg', '.bmp', '.tif', '.tiff', '.webp', '.pgm', '.ppm')
 _VIDEOS = ('.mp4', '.avi', '.mkv', '.mov', '.webm', '.m4v', '.mjpg', '.mjpeg')
+# The pixels as the sensor gave them: nodes that use the calibration do not turn pictures either.
+_AS_TAKEN = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION
 _LOOKS_PER_SECOND = 10
 """Frames of a video that are looked at; a hand does not hold a sheet still for less."""
 
@@ -88,7 +90,7 @@ def _picture(path: Path) -> Picture:
         content = np.frombuffer(path.read_bytes(), np.uint8)
     except OSError as error:
         raise SourceError(f'{path} cannot be read: {error.strerror}') from error
-    gray = cv2.imdecode(content, cv2.IMREAD_GRAYSCALE) if len(content) else None
+    gray = cv2.imdecode(content, _AS_TAKEN) if len(content) else None
     if gray is None:
         raise SourceError(f'{path} is not a picture that can be read')
     return Picture(path.name, gray)

@@ -1,6 +1,7 @@
 import cv2
 import numpy as np
 import pytest
+from exif import turned
 
 from fisheye_geometry.errors import SourceError
 from fisheye_undistort.pictures import read_pictures
@@ -35,6 +36,13 @@ def test_colour_becomes_grey(tmp_path):
     (picture,) = read_pictures([tmp_path / 'red.png'])
     assert picture.gray.shape == (4, 6)
     assert picture.gray.dtype == np.uint8
+
+
+def test_pixels_come_as_the_sensor_gave_them_whatever_exif_says(tmp_path):
+    coded = cv2.imencode('.jpg', grey(90))[1].tobytes()
+    (tmp_path / 'turned.jpg').write_bytes(turned(coded))
+    (picture,) = read_pictures([tmp_path / 'turned.jpg'])
+    assert picture.gray.shape == (48, 64)
 
 
 @pytest.mark.parametrize(('half', 'value'), [('left', 10), ('right', 200)])
