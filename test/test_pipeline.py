@@ -6,11 +6,11 @@ import os
 import time
 
 import pytest
-from rclpy.time import Time
 from rig import COMPOSED, SEPARATE, SIDES, camera_parameters, wait_for
 from sensor_msgs.msg import CameraInfo, CompressedImage
 
 from fisheye_bridge.camera_info import camera_of
+from fisheye_bridge.stamps import ns_of
 
 RATE_HZ = 30.0
 WATCHED_S = float(os.environ.get('WATCHED_S', '8'))
@@ -37,7 +37,7 @@ def captured_stamps(watcher):
     seen, both = {'left': set(), 'right': set()}, set()
 
     def take(side, message):
-        stamp = Time.from_msg(message.header.stamp).nanoseconds
+        stamp = ns_of(message.header.stamp)
         seen[side].add(stamp)
         if stamp in seen['left'] & seen['right']:
             both.add(stamp)

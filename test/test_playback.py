@@ -5,7 +5,6 @@ import threading
 import numpy as np
 import pytest
 import rclpy
-from rclpy.time import Time
 from rig import wait_for
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image
@@ -14,6 +13,7 @@ from std_msgs.msg import Header
 from fisheye_bridge.camera_info import camera_info_of
 from fisheye_bridge.images import to_message
 from fisheye_bridge.qos import IMAGE
+from fisheye_bridge.stamps import stamp_of
 from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.camera_file import Camera
@@ -56,7 +56,7 @@ class Player:
         stamp_ns = RECORDED_NS
         while not self._ended.wait(PERIOD_S):
             stamp_ns += round(PERIOD_S * 1e9)
-            stamp = Time(nanoseconds=stamp_ns).to_msg()
+            stamp = stamp_of(stamp_ns)
             self._clock.publish(Clock(clock=stamp))
             for view, info, image, camera_info in self._eyes:
                 info.header.stamp = stamp
@@ -79,7 +79,7 @@ def test_a_recording_is_stitched_with_its_own_stamps_and_time(rig, watcher, play
         lambda: watcher.overlaps and watcher.overlaps.overlaps[0].found, START_S, 'an overlap'
     )
     assert watcher.overlaps.overlaps[0].offset_deg == pytest.approx(140, abs=0.5)
-    recorded = Time(nanoseconds=RECORDED_NS).to_msg().sec
+    recorded = stamp_of(RECORDED_NS).sec
     assert 0 <= watcher.newest.header.stamp.sec - recorded < 2 * START_S
     # What the node announces goes by the recording's time too.
     assert 0 <= watcher.overlaps.header.stamp.sec - recorded < 2 * START_S

@@ -5,10 +5,10 @@ import time
 
 import rclpy
 from rclpy.executors import ExternalShutdownException
-from rclpy.time import Time
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
 from fisheye_bridge.qos import IMAGE_INPUT
+from fisheye_bridge.stamps import ns_of
 
 KINDS = {kind.__name__: kind for kind in (Image, CompressedImage, CameraInfo)}
 
@@ -22,7 +22,7 @@ def main() -> None:
     arguments = parser.parse_args()
 
     def take(message):
-        stamp_ns = Time.from_msg(message.header.stamp).nanoseconds
+        stamp_ns = ns_of(message.header.stamp)
         print(stamp_ns, f'{(time.time_ns() - stamp_ns) / 1e6:.1f}', flush=True)
         time.sleep(arguments.pause)
 

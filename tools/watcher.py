@@ -8,11 +8,11 @@ import rclpy
 from fisheye_msgs.msg import Overlaps, Projection
 from fisheye_msgs.srv import CalibrateOverlap
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.time import Time
 from sensor_msgs.msg import Image
 
 from fisheye_bridge.images import to_array
 from fisheye_bridge.qos import IMAGE_INPUT, LATCHED
+from fisheye_bridge.stamps import ns_of
 
 
 class Watcher:
@@ -96,7 +96,7 @@ class Watcher:
             self._executor.spin_once(timeout_sec=0.1)
 
     def _take(self, message) -> None:
-        stamp_ns = Time.from_msg(message.header.stamp).nanoseconds
+        stamp_ns = ns_of(message.header.stamp)
         self.stamps_ns.append(stamp_ns)
         self.latencies_ms.append((time.time_ns() - stamp_ns) / 1e6)
         self.newest = message

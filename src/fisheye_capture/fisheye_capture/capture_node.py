@@ -1,7 +1,6 @@
 """One camera as a node: its pictures, and beside each what the camera sees."""
 
 from rclpy.node import Node
-from rclpy.time import Time
 from sensor_msgs.msg import CameraInfo
 from sensor_msgs.srv import SetCameraInfo
 from std_msgs.msg import Header
@@ -11,6 +10,7 @@ from fisheye_bridge.diagnostics import ERROR, WARN, Diagnostics, Shedding
 from fisheye_bridge.parameters import Parameters
 from fisheye_bridge.qos import IMAGE
 from fisheye_bridge.running import run
+from fisheye_bridge.stamps import stamp_of
 from fisheye_bridge.topics import WARNING_PAUSE_S, ImagePublisher
 from fisheye_capture.calibration_url import calibration_path
 from fisheye_capture.grabber import Grabber
@@ -62,8 +62,7 @@ class CaptureNode(Node):
 
     def _publish(self, frame: Frame | JpegFrame) -> None:
         settings = self._declared.settings
-        stamp = Time(nanoseconds=frame.stamp_ns).to_msg()
-        header = Header(stamp=stamp, frame_id=self._settings.frame_id)
+        header = Header(stamp=stamp_of(frame.stamp_ns), frame_id=self._settings.frame_id)
         if self._described != (self._camera, *frame.size):
             self._describe(self._camera, *frame.size)
         try:

@@ -9,12 +9,12 @@ import rclpy
 from fisheye_msgs.msg import Projection
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
-from rclpy.time import Time
 from rclpy.utilities import remove_ros_args
 
 from fisheye_bridge.images import converted
 from fisheye_bridge.projection import surface_of
 from fisheye_bridge.qos import LATCHED
+from fisheye_bridge.stamps import ns_of
 from fisheye_bridge.topics import ImageSubscription
 from fisheye_geometry.errors import FisheyeError, SourceError
 from panorama_stitch.snapshot import FORMATS, save
@@ -44,7 +44,7 @@ class SnapshotNode(Node):
         # Behind a new projection there may still be a picture of the old one.
         if surface and image.shape[1::-1] == (surface.width, surface.height):
             image = converted(image, encoding, 'mono8' if encoding == 'mono8' else 'bgr8')
-            self.taken = image, surface, Time.from_msg(header.stamp).nanoseconds
+            self.taken = image, surface, ns_of(header.stamp)
 
 
 def parse() -> argparse.Namespace:

@@ -10,7 +10,6 @@ from fisheye_msgs.msg import Overlap, Overlaps, Projection
 from fisheye_msgs.srv import CalibrateOverlap
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rclpy.time import Time
 from sensor_msgs.msg import CompressedImage
 
 from fisheye_bridge.diagnostics import Diagnostics
@@ -18,6 +17,7 @@ from fisheye_bridge.parameters import Parameters
 from fisheye_bridge.projection import surface_of
 from fisheye_bridge.qos import IMAGE_INPUT, LATCHED
 from fisheye_bridge.running import run
+from fisheye_bridge.stamps import ns_of
 from fisheye_geometry.errors import FisheyeError, OverlapError
 from panorama_stitch.viewer_server import ViewerServer
 from panorama_stitch.viewer_settings import ViewerSettings
@@ -72,7 +72,7 @@ class ViewerNode(Node):
             self._image = None
 
     def _take_image(self, message) -> None:
-        delay_ns = (self.get_clock().now() - Time.from_msg(message.header.stamp)).nanoseconds
+        delay_ns = self.get_clock().now().nanoseconds - ns_of(message.header.stamp)
         self._status.picture(monotonic(), delay_ns / 1e9)
         self._server.show(message.data.tobytes())
 

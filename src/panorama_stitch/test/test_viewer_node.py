@@ -22,6 +22,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CompressedImage
 
 from fisheye_bridge.qos import IMAGE, LATCHED
+from fisheye_bridge.stamps import stamp_of
 from fisheye_geometry.errors import SettingError
 from panorama_stitch.viewer_node import ViewerNode
 
@@ -32,8 +33,9 @@ JPEG = b'\xff\xd8 as it is \xff\xd9'
 class Stitching(Node):
     """Publishes what the stitch node would, in the namespace /rig."""
 
-    def __init__(self, context):
+    def __init__(self, context, stamp=None):
         super().__init__('stitch', context=context, namespace='/rig')
+        self.stamp = stamp
         self.image = self.create_publisher(CompressedImage, 'panorama/image/compressed', IMAGE)
         self.projection = self.create_publisher(Projection, 'panorama/projection', LATCHED)
         self.overlap = self.create_publisher(Overlaps, 'panorama/overlap', LATCHED)
@@ -42,7 +44,7 @@ class Stitching(Node):
 
     def publish(self):
         message = CompressedImage(format='bgr8; jpeg compressed bgr8', data=array('B', JPEG))
-        message.header.stamp = self.get_clock().now().to_msg()
+        message.header.stamp = self.stamp or self.get_clock().now().to_msg()
         self.image.publish(message)
         skew = [KeyValue(key='skew median ms', value='2.5')]
         self.diagnostics.publish(
@@ -117,11 +119,8 @@ def visit(scenario):
     return asyncio.run(run())
 
 
-def test_pictures_go_to_the_browser_as_they_are_and_only_while_one_looks(ros):
-    stitching, node = Stitching(ros.context), viewer(ros, port=0)
-    ros.start(stitching, node)
-    wait_for(lambda: stitching.projection.get_subscription_count())
-    assert not stitching.image.get_subscription_count()
+def look(node):
+    """Give the first picture that a browser is shown."""
 
     async def look(session):
         async with session.ws_connect(f'{node.url}live') as stream:
@@ -129,9 +128,18 @@ def test_pictures_go_to_the_browser_as_they_are_and_only_while_one_looks(ros):
                 if message.type is aiohttp.WSMsgType.BINARY:
                     return message.data
 
-    assert visit(look) == JPEG
+    return visit(look)
+
+
+def test_pictures_go_to_the_browser_as_they_are_and_only_while_one_looks(ros):
+    stitching, node = Stitching(ros.context), viewer(ros, port=0)
+    ros.start(stitching, node)
+    wait_for(lambda: stitching.projection.get_subscription_count())
+    assert not stitching.image.get_subscription_count()
+
+    assert look(node) == JPEG
     wait_for(lambda: not stitching.image.get_subscription_count())
-    assert visit(look) == JPEG
+    assert look(node) == JPEG
 
 
 def test_the_page_is_told_what_the_rig_says(ros):
@@ -164,6 +172,13 @@ def test_the_page_is_told_what_the_rig_says(ros):
     assert [problem['text'] for problem in told['problems']] == ['Left camera: unplugged']
     assert told['skew_ms'] == 2.5
     assert 0 <= told['delay_ms'] < 1000 * DEADLINE_S
+
+
+def test_a_negative_stamp_is_a_stamp_too(ros):
+    stitching, node = Stitching(ros.context, stamp_of(-1)), viewer(ros, port=0)
+    ros.start(stitching, node)
+
+    assert look(node) == JPEG
 
 
 def test_the_delay_of_a_recording_goes_by_its_own_time(ros):

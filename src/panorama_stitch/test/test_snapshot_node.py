@@ -1,0 +1,50 @@
+"""The node behind the command snapshot, beside a node that publishes panoramas."""
+
+import numpy as np
+import pytest
+import rclpy
+from fisheye_msgs.msg import Projection
+from rclpy.executors import SingleThreadedExecutor
+from sensor_msgs.msg import Image
+from std_msgs.msg import Header
+
+from fisheye_bridge.images import to_message
+from fisheye_bridge.projection import projection_of
+from fisheye_bridge.qos import IMAGE, LATCHED
+from fisheye_bridge.stamps import stamp_of
+from fisheye_geometry.surface import Surface
+from panorama_stitch.snapshot_node import SnapshotNode
+
+SURFACE = Surface('cylindrical', 32, 12, 10.0, 15.5, 5.5)
+PANORAMA = np.full((12, 32, 3), (10, 20, 30), np.uint8)
+SPINS = 500
+
+
+@pytest.fixture
+def context():
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    yield context
+    rclpy.shutdown(context=context)
+
+
+@pytest.mark.parametrize('stamp_ns', [1_700_000_000_250_000_000, -1])
+def test_a_panorama_is_taken_with_its_surface_and_any_stamp(context, stamp_ns):
+    where = {'context': context, 'namespace': '/snapshot_test'}
+    node, stitching = SnapshotNode(**where), rclpy.create_node('stitch', **where)
+    projection = stitching.create_publisher(Projection, 'panorama/projection', LATCHED)
+    image = stitching.create_publisher(Image, 'panorama/image', IMAGE)
+    header = Header(stamp=stamp_of(stamp_ns))
+    projection.publish(projection_of(SURFACE, header))
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    for _ in range(SPINS):
+        image.publish(to_message(PANORAMA[..., ::-1], 'rgb8', header))
+        executor.spin_once(timeout_sec=0.02)
+        if node.taken:
+            break
+    taken, surface, taken_ns = node.taken
+    np.testing.assert_array_equal(taken, PANORAMA)
+    assert (surface, taken_ns) == (SURFACE, stamp_ns)
+    for ended in (node, stitching):
+        ended.destroy_node()
