@@ -27,13 +27,20 @@ def calibration_path(url: str) -> Path | None:
     Raises
     ------
     CameraFileError
-        For another scheme, and for a package that is not installed.
+        For another scheme, for a package that is not installed and for a user who is not known.
     """
     if not url:
         return None
+    if '\0' in unquote(url):
+        raise CameraFileError(f'camera_info_url {url!r} has a zero byte; expected a path or URL')
     scheme, mark, rest = url.partition('://')
     if not mark:
-        return Path(url).expanduser()
+        try:
+            return Path(url).expanduser()
+        except RuntimeError as error:
+            raise CameraFileError(
+                f"camera_info_url '{url}' names the home of a user who is not known"
+            ) from error
     if scheme == 'file':
         return Path(unquote(rest))
     if scheme != 'package':

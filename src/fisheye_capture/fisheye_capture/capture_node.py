@@ -55,9 +55,13 @@ class CaptureNode(Node):
         path = self._calibration_path
         if path is None:
             return self._grabber.camera
-        if not path.exists():
+        try:
+            path.stat()
+        except FileNotFoundError:
             self.get_logger().warning(f'{path} is not there yet; set_camera_info writes it')
             return None
+        except OSError:
+            pass  # What is wrong with it, the one who reads it says.
         return read_camera(path)
 
     def _publish(self, frame: Frame | JpegFrame) -> None:

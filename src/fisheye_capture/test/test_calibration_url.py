@@ -45,6 +45,15 @@ def test_a_package_that_is_not_there_is_named(package):
         calibration_path(f'package://{package}/left.yaml')
 
 
+@pytest.mark.parametrize(
+    ('url', 'told'),
+    [('~no_such_user/left.yaml', 'a user who is not known'), ('file:///a%00b', 'a zero byte')],
+)
+def test_what_can_be_no_path_is_refused(url, told):
+    with pytest.raises(CameraFileError, match=told):
+        calibration_path(url)
+
+
 def test_another_scheme_is_refused():
     with pytest.raises(CameraFileError, match="scheme 'http'; expected a path"):
         calibration_path('http://camera/left.yaml')

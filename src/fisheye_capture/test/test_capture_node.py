@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from exif import turned
+from odd_pictures import turned
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -278,6 +278,8 @@ def test_a_camera_that_is_not_there_is_an_error_in_the_diagnostics(ros):
         ({'encoding': 'yuv'}, SettingError, 'bgr8, mono8, rgb8'),
         ({'camera_info_url': 'http://x/y.yaml'}, CameraFileError, "scheme 'http'"),
         ({'camera_info_url': 'package://nowhere_/y.yaml'}, CameraFileError, 'not installed'),
+        ({'camera_info_url': 'x' * 300}, CameraFileError, 'cannot be read: File name too long'),
+        ({'camera_info_url': '/dev/null/x'}, CameraFileError, 'cannot be read: Not a directory'),
     ],
 )
 def test_what_can_never_work_is_refused_at_start(ros, parameters, error, sentence):

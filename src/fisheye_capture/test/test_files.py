@@ -1,11 +1,9 @@
 """Pictures, folders and videos: held, in turn, looped; what cannot be read is named."""
 
-import struct
-import zlib
-
 import cv2
 import numpy as np
 import pytest
+from odd_pictures import huge_png
 
 from fisheye_capture.source import SourceEndedError
 from fisheye_capture.sources import open_source
@@ -108,13 +106,8 @@ def test_a_file_that_is_no_picture_is_named(settings, tmp_path, name):
 
 
 def test_a_picture_of_absurd_size_is_named(settings, tmp_path):
-    def chunk(kind, content):
-        checksum = struct.pack('>I', zlib.crc32(kind + content))
-        return struct.pack('>I', len(content)) + kind + content + checksum
-
-    header = chunk(b'IHDR', struct.pack('>IIBBBBB', 60_000, 60_000, 8, 2, 0, 0, 0))
     path = tmp_path / 'huge.png'
-    path.write_bytes(b'\x89PNG\r\n\x1a\n' + header + chunk(b'IDAT', b'') + chunk(b'IEND', b''))
+    path.write_bytes(huge_png())
     with pytest.raises(SourceError, match=r'huge\.png cannot be read'):
         open_source(settings(path))
 

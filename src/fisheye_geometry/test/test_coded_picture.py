@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 import pytest
-from exif import turned
+from odd_pictures import turned
 
 from fisheye_geometry.coded_picture import decoded, size_of, whole_jpeg
 from fisheye_geometry.errors import ImageFormatError

@@ -1,5 +1,6 @@
 """Read the pictures that a calibration is made from: files, folders, globs and videos."""
 
+import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from glob import glob
@@ -70,12 +71,12 @@ def cut(gray: np.ndarray, half: str) -> np.ndarray:
 def _expand(paths: Iterable[str | Path]) -> list[Path]:
     found = []
     for path in paths:
-        if Path(path).is_dir():
+        if os.path.isdir(path):
             inside = sorted(p for p in Path(path).iterdir() if p.suffix.lower() in _PICTURES)
             if not inside:
                 raise SourceError(f'the folder {path} has no pictures ({", ".join(_PICTURES)})')
             found += inside
-        elif Path(path).exists():
+        elif os.path.exists(path):
             found.append(Path(path))
         else:
             matching = sorted(map(Path, glob(str(path), recursive=True)))
@@ -90,7 +91,10 @@ def _picture(path: Path) -> Picture:
         content = np.frombuffer(path.read_bytes(), np.uint8)
     except OSError as error:
         raise SourceError(f'{path} cannot be read: {error.strerror}') from error
-    gray = cv2.imdecode(content, _AS_TAKEN) if len(content) else None
+    try:
+        gray = cv2.imdecode(content, _AS_TAKEN) if len(content) else None
+    except cv2.error:
+        gray = None  # OpenCV refuses pictures that are too large this way.
     if gray is None:
         raise SourceError(f'{path} is not a picture that can be read')
     return Picture(path.name, gray)

@@ -1,7 +1,7 @@
 import cv2
 import numpy as np
 import pytest
-from exif import turned
+from odd_pictures import huge_png, turned
 
 from fisheye_geometry.errors import SourceError
 from fisheye_undistort.pictures import read_pictures
@@ -72,6 +72,8 @@ def test_a_video_gives_ten_frames_a_second(tmp_path):
         ('missing.png', None, 'missing.png is not there'),
         ('broken.png', b'nothing like a picture', 'broken.png is not a picture'),
         ('empty.jpg', b'', 'empty.jpg is not a picture'),
+        ('huge.png', huge_png(), 'huge.png is not a picture'),
+        ('x' * 300, None, 'x is not there'),
         ('broken.mp4', b'nothing like a video', 'broken.mp4 is not a video'),
     ],
 )
