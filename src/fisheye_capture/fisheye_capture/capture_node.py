@@ -16,7 +16,7 @@ from fisheye_capture.calibration_url import calibration_path
 from fisheye_capture.grabber import Grabber
 from fisheye_capture.newest import Newest
 from fisheye_capture.settings import CaptureSettings
-from fisheye_capture.source import Frame, JpegFrame
+from fisheye_capture.source import Frame, JpegFrame, shown_source
 from fisheye_geometry.camera_file import Camera, read_camera, write_camera
 from fisheye_geometry.errors import CameraFileError, FisheyeError
 
@@ -126,7 +126,7 @@ class CaptureNode(Node):
             report.add(WARN, grabber.note)
         if self._fault:
             report.add(ERROR if self._camera else WARN, self._fault)
-        report.values['source'] = self._settings.source
+        report.values['source'] = shown_source(self._settings.source)
         report.values['rate Hz'] = grabber.rate.hz
         report.values['pictures'] = grabber.frames
         skipped = grabber.skipped + self._publishing.dropped

@@ -1,5 +1,6 @@
 """What every source of pictures is: something that gives the next frame until it is lost."""
 
+import re
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
@@ -92,6 +93,11 @@ class Source(ABC):
 
     def close(self) -> None:  # noqa: B027
         """Release what the source holds; no `read` may be under way."""
+
+
+def shown_source(source: str) -> str:
+    """Give a source as others may read it: a URL without its user and password."""
+    return re.sub('://[^/]*@', '://', source)
 
 
 _FROM_COLOR = {'rgb8': cv2.COLOR_BGR2RGB, 'mono8': cv2.COLOR_BGR2GRAY}

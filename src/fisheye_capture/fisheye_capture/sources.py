@@ -14,7 +14,7 @@ from fisheye_capture.files import (
 )
 from fisheye_capture.live import DeviceSource
 from fisheye_capture.settings import CaptureSettings
-from fisheye_capture.source import Source
+from fisheye_capture.source import Source, shown_source
 from fisheye_capture.stream import StreamSource
 from fisheye_capture.synthetic import SyntheticSource
 from fisheye_geometry.errors import SourceError
@@ -42,7 +42,7 @@ def open_source(settings: CaptureSettings) -> Source:
         return StreamSource(settings)
     if mark and scheme != 'file':
         raise SourceError(
-            f"source '{source}' has the scheme '{scheme}'; expected one of "
+            f"source '{shown_source(source)}' has the scheme '{scheme}'; expected one of "
             f'{", ".join(_STREAMS)} or file'
         )
     return _open_files(settings, os.path.expanduser(rest if mark else source))

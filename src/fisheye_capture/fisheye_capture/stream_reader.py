@@ -1,13 +1,12 @@
 """The process that reads a network stream for a `StreamSource` and writes its frames to stdout."""
 
 import os
-import re
 import sys
 
 import cv2
 
 from fisheye_capture.live import LiveSource
-from fisheye_capture.source import SourceLostError
+from fisheye_capture.source import SourceLostError, shown_source
 from fisheye_capture.stream import HEADER
 from fisheye_geometry.errors import SourceError
 
@@ -26,7 +25,7 @@ def open_stream(url: str, encoding: str, frame_rate_hz: float) -> LiveSource:
     SourceLostError
         If nothing answers, or what answers is no stream.
     """
-    name = re.sub('//[^/]*@', '//', url)
+    name = shown_source(url)
     read_timeout_s = max(_READ_TIMEOUT_S, _SLOW_PERIODS / frame_rate_hz)
     limits = {
         cv2.CAP_PROP_OPEN_TIMEOUT_MSEC: _OPEN_TIMEOUT_S,

@@ -270,6 +270,14 @@ def test_a_camera_that_is_not_there_is_an_error_in_the_diagnostics(ros):
     assert '/left/image_raw' not in ros.ear.heard
 
 
+def test_the_diagnostics_do_not_tell_the_password(ros):
+    ros.start(source='http://user:secret@127.0.0.1:1/stream')
+    status = ros.hear('/diagnostics').status[0]
+    values = {entry.key: entry.value for entry in status.values}
+    assert values['source'] == 'http://127.0.0.1:1/stream'
+    assert 'secret' not in str(status)
+
+
 @pytest.mark.parametrize(
     ('parameters', 'error', 'sentence'),
     [

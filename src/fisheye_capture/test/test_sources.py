@@ -3,7 +3,7 @@
 import pytest
 
 from fisheye_capture import sources
-from fisheye_capture.source import SourceLostError
+from fisheye_capture.source import SourceLostError, shown_source
 from fisheye_capture.sources import open_source
 from fisheye_geometry.errors import SourceError
 
@@ -42,6 +42,23 @@ def test_a_file_url_is_a_file(settings, write_picture):
 def test_an_unknown_scheme_is_refused_with_those_that_are_known(settings):
     with pytest.raises(SourceError, match=r"scheme 'ftp'; expected one of http, .*udp or file"):
         open_source(settings('ftp://camera'))
+
+
+@pytest.mark.parametrize(
+    ('source', 'shown'),
+    [
+        ('rtsp://user:secret@camera:554/live', 'rtsp://camera:554/live'),
+        ('http://camera/live@2x', 'http://camera/live@2x'),
+        ('rig//left@home.png', 'rig//left@home.png'),
+    ],
+)
+def test_a_source_is_shown_without_its_password(source, shown):
+    assert shown_source(source) == shown
+
+
+def test_a_refusal_does_not_tell_the_password(settings):
+    with pytest.raises(SourceError, match="source 'ftp://camera' has the scheme"):
+        open_source(settings('ftp://user:secret@camera'))
 
 
 @pytest.mark.parametrize('name', ['nowhere.png', 'nowhere/*.png', '', '~no_such_user/x'])
