@@ -129,8 +129,9 @@ class CaptureNode(Node):
         report.values['source'] = shown_source(self._settings.source)
         report.values['rate Hz'] = grabber.rate.hz
         report.values['pictures'] = grabber.frames
-        skipped = grabber.skipped + self._publishing.dropped
-        self._shedding.tell(report, grabber.frames, skipped)
+        dropped = self._publishing.dropped
+        skipped = grabber.skipped + dropped
+        self._shedding.tell(report, grabber.frames - dropped, skipped)
         report.values['pictures skipped'] = skipped
         report.values['pictures broken'] = self._broken
 

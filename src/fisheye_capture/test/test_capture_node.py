@@ -270,6 +270,13 @@ def test_a_camera_that_is_not_there_is_an_error_in_the_diagnostics(ros):
     assert '/left/image_raw' not in ros.ear.heard
 
 
+def test_a_picture_that_was_not_published_is_not_counted_as_handled(ros):
+    node = ros.start(source=97, reconnect_max_s=3600.0)
+    node._grabber.frames, node._publishing.dropped = 100, 40
+    told = ros.hear('/diagnostics').status[0].message
+    assert '40 of the last 100 pictures were shed' in told
+
+
 def test_the_diagnostics_do_not_tell_the_password(ros):
     ros.start(source='http://user:secret@127.0.0.1:1/stream')
     status = ros.hear('/diagnostics').status[0]
