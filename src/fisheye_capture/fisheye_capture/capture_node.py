@@ -113,15 +113,14 @@ class CaptureNode(Node):
 
     def _tell(self, reason: str) -> None:
         if reason:
-            self.get_logger().warning(f'no pictures: {reason}')
+            self.get_logger().warning(self._grabber.news(reason))
         else:
-            note = self._grabber.note
-            self.get_logger().info('pictures come' + (f'; {note}' if note else ''))
+            self.get_logger().info(self._grabber.news(reason))
 
     def _report(self, report) -> None:
         grabber = self._grabber
-        if grabber.reason:
-            report.add(ERROR, f'{grabber.reason} (attempts to reopen: {grabber.attempts})')
+        if grabber.complaint:
+            report.add(ERROR, grabber.complaint)
         if grabber.note:
             report.add(WARN, grabber.note)
         if self._fault:

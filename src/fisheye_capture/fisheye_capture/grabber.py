@@ -77,6 +77,18 @@ class Grabber:
         return source.note if source else ''
 
     @property
+    def complaint(self) -> str:
+        """Why there are no frames now, and what was done about it; '' while they come."""
+        reason = self.reason  # The reading thread may change it at any moment.
+        return f'{reason} (attempts to reopen: {self.attempts})' if reason else ''
+
+    def news(self, reason: str) -> str:
+        """Say that the frames stopped, and why, or with '' that they come."""
+        if reason:
+            return f'no pictures: {reason}'
+        return f'pictures come; {self.note}' if self.note else 'pictures come'
+
+    @property
     def skipped(self) -> int:
         """Frames of the open source that were due while the one before was still in work."""
         source = self._source

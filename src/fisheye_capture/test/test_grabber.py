@@ -137,10 +137,21 @@ def test_changes_are_told(settings, wait_until, monkeypatch):
         Prepared([Frame(1, None), SourceLostError('unplugged')]),
         Prepared([Frame(2, None), SourceEndedError('over')]),
     ]
+    waiting[1].note = 'half as fast'
     monkeypatch.setattr(grabber_module, 'open_source', lambda settings: waiting.pop(0))
     told = []
-    grabber = Grabber(settings('any'), lambda frame: None, on_change=told.append)
+
+    def tell(reason):
+        told.append((grabber.news(reason), grabber.complaint))
+
+    grabber = Grabber(settings('any'), lambda frame: None, on_change=tell)
+    assert grabber.complaint == 'waiting for the first picture (attempts to reopen: 0)'
     grabber.start()
-    wait_until(lambda: 'over' in told, 'the end')
+    wait_until(lambda: len(told) == 4, 'the end')
     grabber.stop()
-    assert told == ['', 'unplugged', '', 'over']
+    assert told == [
+        ('pictures come', ''),
+        ('no pictures: unplugged', 'unplugged (attempts to reopen: 0)'),
+        ('pictures come; half as fast', ''),
+        ('no pictures: over', 'over (attempts to reopen: 0)'),
+    ]
