@@ -15,7 +15,7 @@ from fisheye_undistort.pictures import HALVES, read_pictures
 from fisheye_undistort.report import Report
 from fisheye_undistort.target import KINDS, STANDARD, Target
 
-GOOD, NOTHING_WRITTEN, POOR = 0, 1, 2
+GOOD, FAILED, POOR = 0, 1, 2
 _INTERRUPTED = 130
 
 
@@ -25,12 +25,12 @@ class _Parser(argparse.ArgumentParser):
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; give its exit code: 0 good, 2 poor but written, 1 nothing written."""
+    """Run the command; give its exit code: 0 good, 2 poor but written, 1 failed."""
     try:
         return _run(_parser().parse_args(arguments))
     except FisheyeError as error:
         print(f'calibrate_lens: {error}', file=sys.stderr)
-        return NOTHING_WRITTEN
+        return FAILED
     except KeyboardInterrupt:
         return _INTERRUPTED
 
@@ -39,7 +39,7 @@ def _parser() -> _Parser:
     parser = _Parser(
         prog='calibrate_lens',
         description=__doc__,
-        epilog='Exit code: 0 good, 2 poor but written, 1 nothing written.',
+        epilog='Exit code: 0 good, 2 poor but written, 1 failed: a sentence says why.',
     )
     add = parser.add_argument
     add('pictures', nargs='*', help='pictures, folders, globs, videos')
@@ -82,6 +82,10 @@ def _run(options: argparse.Namespace) -> int:
 
         print(f'{options.print}: {target}, on {write_sheet(options.print, target)}')
         return GOOD
+    if options.plot:
+        from fisheye_undistort.report_plot import check_plot, plot_report
+
+        check_plot(options.plot)
     collector = Collector(Detector(target, options.min_area_px, options.max_area_px))
     if options.topic:
         try:
@@ -96,13 +100,11 @@ def _run(options: argparse.Namespace) -> int:
         raise SettingError('nothing to do: give pictures, --topic or --print (see --help)')
     calibration = calibrate(collector.finish(), target, collector.size)
     report = Report(calibration, collector.brightest, collector.skipped)
-    if options.plot:
-        from fisheye_undistort.report_plot import plot_report
-
-        plot_report(options.plot, report, collector.example)
     output = options.output or Path(f'{options.name}.yaml')
     write_camera(output, Camera(options.name, calibration.lens))
     print(f'{report}\nwritten  {output}')
+    if options.plot:
+        plot_report(options.plot, report, collector.example)
     return GOOD if report.good else POOR
 
 

@@ -1,5 +1,6 @@
 """Draw what a calibration is worth."""
 
+import os
 from pathlib import Path
 from textwrap import fill
 
@@ -12,12 +13,31 @@ from fisheye_geometry.surface import surface_for
 from fisheye_undistort.calibration import Calibration
 from fisheye_undistort.report import Report
 
+FORMATS = ('.png', '.pdf', '.svg')
+
 _SIZE_INCH = (16, 9.5)
 _TITLE = 150
 """Characters in a line of it."""
 _ARROW_WIDTHS = 0.03
 """Length of the longest residual as drawn, in widths of the picture."""
 _STRAIGHT_FOV_RAD = np.radians(120)
+
+
+def check_plot(path: Path) -> None:
+    """Refuse, before there is a report, what `plot_report` cannot write.
+
+    Raises
+    ------
+    SettingError
+        For another suffix than those of `FORMATS`, and for a folder that is not there.
+    """
+    if path.suffix.lower() not in FORMATS:
+        raise SettingError(
+            f"a plot '{path.name}' cannot be written; "
+            f'expected a name that ends in {", ".join(FORMATS)}'
+        )
+    if not os.path.isdir(path.parent):
+        raise SettingError(f'the plot {path} cannot be written: there is no folder {path.parent}')
 
 
 def plot_report(path: str | Path, report: Report, example: np.ndarray) -> None:

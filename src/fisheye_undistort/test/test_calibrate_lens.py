@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from fisheye_geometry.camera_file import read_camera
-from fisheye_undistort.calibrate_lens import GOOD, NOTHING_WRITTEN, POOR, main
+from fisheye_undistort.calibrate_lens import FAILED, GOOD, POOR, main
 
 FOCAL = 0.003
 
@@ -20,7 +20,7 @@ def shots(paper_pictures, tmp_path_factory):
 
 def refused(capsys, *arguments):
     """Run a command that must fail; give its sentence."""
-    assert main([str(argument) for argument in arguments]) == NOTHING_WRITTEN
+    assert main([str(argument) for argument in arguments]) == FAILED
     told = capsys.readouterr().err
     assert told.startswith('calibrate_lens: ')
     assert told.count('\n') == 1
@@ -125,9 +125,16 @@ def test_without_ros_only_the_topic_is_refused(monkeypatch, capsys):
     assert '--topic needs ROS 2' in refused(capsys, '--topic', '/left/image_raw')
 
 
-def test_where_the_plot_cannot_be_drawn_nothing_is_written(shots, tmp_path, capsys):
-    output = tmp_path / 'camera.yaml'
-    plot = tmp_path / 'nowhere' / 'plot.png'
+@pytest.mark.parametrize('name', ['nowhere/plot.png', 'plot.docx', 'plot'])
+def test_a_plot_that_cannot_be_is_refused_before_the_work_begins(name, tmp_path, capsys):
+    told = refused(capsys, tmp_path / 'never read.png', '--plot', tmp_path / name)
+    assert 'plot' in told
+    assert 'cannot be written' in told
+
+
+def test_a_plot_that_fails_leaves_the_camera(shots, tmp_path, capsys):
+    output, plot = tmp_path / 'camera.yaml', tmp_path / 'folder.png'
+    plot.mkdir()
     told = refused(capsys, shots / 'shot01.png', '-o', output, '--plot', plot)
     assert 'the plot' in told
-    assert not output.exists()
+    assert read_camera(output).name == 'camera'
