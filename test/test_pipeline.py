@@ -78,7 +78,7 @@ def test_the_synthetic_rig_is_stitched_where_it_should_be(rig, watcher):
     true_px = math.radians(140) * watcher.projection.focal_px
     assert overlap.offset_x_px == pytest.approx(true_px, abs=CLOSE_PX)
     assert overlap.offset_deg == pytest.approx(140, abs=0.5)
-    assert 0 < Time.from_msg(overlap.header.stamp).nanoseconds <= watcher.stamps_ns[-1]
+    assert 0 < ns_of(overlap.header.stamp) <= watcher.stamps_ns[-1]
     answer = watcher.calibrate()
     assert answer.success
     assert answer.overlaps[0].offset_x_px == pytest.approx(true_px, abs=CLOSE_PX)

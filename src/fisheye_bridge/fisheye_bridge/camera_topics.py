@@ -8,9 +8,9 @@ from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
 from fisheye_bridge.camera_info import camera_of
-from fisheye_bridge.diagnostics import ERROR, WARN, Report
-from fisheye_bridge.qos import IMAGE
-from fisheye_bridge.topics import WARNING_PAUSE_S, ImageSubscription
+from fisheye_bridge.diagnostics import ERROR, WARN, WARNING_PAUSE_S, Report
+from fisheye_bridge.qos import BEST_EFFORT_INPUT
+from fisheye_bridge.topics import ImageSubscription
 from fisheye_geometry.errors import CalibrationError, FisheyeError
 from fisheye_geometry.image_circle import SeenLens
 from fisheye_geometry.lens import Lens
@@ -23,8 +23,8 @@ class CameraSubscription:
     ----------
     lens : Lens or None
         The last good one, within the circle that it lights.
-    refused : int
-        Pictures that were not usable.
+    pictures : ImageSubscription
+        Its pictures; those that were not usable are counted there.
     """
 
     def __init__(
@@ -63,22 +63,21 @@ class CameraSubscription:
         self._content, self._header = '', Header()
         self._picture_size: tuple[int, int] | None = None
         self._refusal, self._is_over = '', False
-        self._pictures = ImageSubscription(
-            node, f'{self._prefix}image_raw', self._take_picture, transport=transport
+        self.pictures = ImageSubscription(
+            node,
+            f'{self._prefix}image_raw',
+            self._take_picture,
+            transport=transport,
+            key=f'{namespace} pictures refused'.lstrip(),
         )
         node.create_subscription(
-            CameraInfo, f'{self._prefix}camera_info', self._take_camera_info, IMAGE
+            CameraInfo, f'{self._prefix}camera_info', self._take_camera_info, BEST_EFFORT_INPUT
         )
 
     @property
     def lens(self) -> Lens | None:
         """The last good lens."""
         return self._seen.lens if self._seen else None
-
-    @property
-    def refused(self) -> int:
-        """Pictures that were dropped."""
-        return self._pictures.refused
 
     def refuse(self, error: FisheyeError) -> None:
         """Say that a lens cannot be used."""
@@ -107,8 +106,7 @@ class CameraSubscription:
             report.add(ERROR, f'waiting for {what}')
         if self._is_over:
             self._refusal = ''
-        if self.refused:
-            report.values[f'{self._prefix}pictures refused'.replace('/', ' ')] = self.refused
+        self.pictures.dropped.tell(report)
 
     def _take_camera_info(self, message: CameraInfo) -> None:
         size = message.width, message.height

@@ -8,7 +8,11 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
+from fisheye_geometry.errors import FisheyeError
+
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+WARNING_PAUSE_S = 5.0
+"""Between two warnings of the same kind in the log."""
 _SHED_SHARE = 0.1
 """Of what comes; less is not worth a warning."""
 
@@ -45,6 +49,35 @@ class Shedding:
                 f'{shed} of the last {handled + shed} {self._things} were shed: '
                 'they come faster than this machine handles them',
             )
+
+
+class Dropped:
+    """Counts what could not be used; says why, in the log and while there is more of it.
+
+    Attributes
+    ----------
+    count : int
+        Since the start.
+    """
+
+    def __init__(self, node: Node, what: str, key: str):
+        """Start; `what` is dropped, `key` names the number in the report."""
+        self.count = 0
+        self._node, self._what, self._key = node, what, key
+        self._sentence, self._told = '', 0
+
+    def add(self, error: FisheyeError) -> None:
+        """Count one more."""
+        self.count += 1
+        self._sentence = f'{self._what} was dropped: {error}'
+        self._node.get_logger().warning(self._sentence, throttle_duration_sec=WARNING_PAUSE_S)
+
+    def tell(self, report: Report) -> None:
+        """Report the number, and warn if it has grown since the last report."""
+        report.values[self._key] = self.count
+        if self.count > self._told:
+            report.add(WARN, self._sentence)
+        self._told = self.count
 
 
 class Diagnostics:

@@ -9,10 +9,13 @@ IMAGE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 IMAGE_INPUT = QoSProfile(depth=3, reliability=ReliabilityPolicy.RELIABLE)
 """Images as they are taken: a moment without the processor loses none."""
 
+BEST_EFFORT_INPUT = QoSProfile(depth=3, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""Where the publisher is not ours: this meets a reliable one and a best-effort one."""
+
 LATCHED = QoSProfile(
     depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
 """State: who comes later still gets the last one."""
 
 ADJUSTABLE = QoSOverridingOptions((QoSPolicyKind.RELIABILITY, QoSPolicyKind.DEPTH))
-"""Lets a parameter `qos_overrides.TOPIC.subscription.reliability` meet a best-effort camera."""
+"""What a parameter such as `qos_overrides.TOPIC.subscription.depth` may change."""

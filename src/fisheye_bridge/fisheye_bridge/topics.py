@@ -4,18 +4,17 @@ from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
-from rclpy.callback_groups import CallbackGroup
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
+from fisheye_bridge.diagnostics import Dropped
 from fisheye_bridge.images import ImageBuffer, from_jpeg, jpeg_message, to_array, to_jpeg
-from fisheye_bridge.qos import ADJUSTABLE, IMAGE, IMAGE_INPUT
+from fisheye_bridge.qos import ADJUSTABLE, BEST_EFFORT_INPUT, IMAGE, IMAGE_INPUT
 from fisheye_geometry.errors import FisheyeError
 
 TRANSPORTS = ('raw', 'compressed')
-WARNING_PAUSE_S = 5.0
-"""Between two warnings of the same kind."""
 
 
 class Picture(Protocol):
@@ -77,9 +76,11 @@ class ImagePublisher:
 class ImageSubscription:
     """Hands over the pictures of a topic as arrays, and keeps what is broken away.
 
+    It is reliable until a publisher turns out not to be.
+
     Attributes
     ----------
-    refused : int
+    dropped : Dropped
         Pictures that were not usable.
     """
 
@@ -90,7 +91,7 @@ class ImageSubscription:
         callback: Callable[[np.ndarray, str, Header], None],
         *,
         transport: str = 'raw',
-        group: CallbackGroup | None = None,
+        key: str = 'pictures refused',
     ):
         """Subscribe.
 
@@ -103,31 +104,37 @@ class ImageSubscription:
             that it raises drops the picture with a warning.
         transport
             'raw', or 'compressed' for the JPEG sub-topic.
-        group
-            Of the callback.
+        key
+            Of the number of dropped pictures in the report.
         """
-        self.refused = 0
         self._node = node
         self._callback = callback
         jpeg = transport == 'compressed'
-        self._convert = from_jpeg if jpeg else to_array
+        self._kind, self._convert = (CompressedImage, from_jpeg) if jpeg else (Image, to_array)
         self._topic = f'{topic}/compressed' if jpeg else topic
-        self._subscription = node.create_subscription(
-            CompressedImage if jpeg else Image,
-            self._topic,
-            self._take,
+        self.dropped = Dropped(node, f'a picture on {self._topic}', key)
+        self._subscribe(
             IMAGE_INPUT,
-            callback_group=group,
+            event_callbacks=SubscriptionEventCallbacks(incompatible_qos=self._make_do),
             qos_overriding_options=ADJUSTABLE,
         )
+
+    def _subscribe(self, qos, **options) -> None:
+        self._subscription = self._node.create_subscription(
+            self._kind, self._topic, self._take, qos, **options
+        )
+
+    def _make_do(self, event) -> None:
+        """Take what is published best effort as it is: better some pictures than none."""
+        self._node.get_logger().warning(
+            f'{self._topic} is published best effort: some pictures may be lost'
+        )
+        self._node.destroy_subscription(self._subscription)
+        self._subscribe(BEST_EFFORT_INPUT)
 
     def _take(self, message) -> None:
         try:
             image, encoding = self._convert(message)
             self._callback(image, encoding, message.header)
         except FisheyeError as error:
-            self.refused += 1
-            self._node.get_logger().warning(
-                f'a picture on {self._topic} was dropped: {error}',
-                throttle_duration_sec=WARNING_PAUSE_S,
-            )
+            self.dropped.add(error)

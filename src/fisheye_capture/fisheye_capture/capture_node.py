@@ -6,12 +6,12 @@ from sensor_msgs.srv import SetCameraInfo
 from std_msgs.msg import Header
 
 from fisheye_bridge.camera_info import camera_info_of, camera_of
-from fisheye_bridge.diagnostics import ERROR, WARN, Diagnostics, Shedding
+from fisheye_bridge.diagnostics import ERROR, WARN, Diagnostics, Dropped, Shedding
 from fisheye_bridge.parameters import Parameters
 from fisheye_bridge.qos import IMAGE
 from fisheye_bridge.running import run
 from fisheye_bridge.stamps import stamp_of
-from fisheye_bridge.topics import WARNING_PAUSE_S, ImagePublisher
+from fisheye_bridge.topics import ImagePublisher
 from fisheye_capture.calibration_url import calibration_path
 from fisheye_capture.grabber import Grabber
 from fisheye_capture.newest import Newest
@@ -33,7 +33,7 @@ class CaptureNode(Node):
         self._image = ImagePublisher(self, 'image_raw')
         self._camera_info = self.create_publisher(CameraInfo, 'camera_info', IMAGE)
         self._info, self._described, self._fault = CameraInfo(), None, ''
-        self._broken = 0
+        self._broken = Dropped(self, 'a picture', 'pictures broken')
         self._publishing = Newest(self._publish, 'publish')
         self._shedding = Shedding('pictures')
         self._grabber = Grabber(self._settings, self._publishing.put, on_change=self._tell)
@@ -72,10 +72,7 @@ class CaptureNode(Node):
         try:
             self._image.publish_picture(frame, settings.encoding, header, settings.jpeg_quality)
         except FisheyeError as error:
-            self._broken += 1
-            self.get_logger().warning(
-                f'a picture was dropped: {error}', throttle_duration_sec=WARNING_PAUSE_S
-            )
+            self._broken.add(error)
             return
         self._info.header = header
         self._camera_info.publish(self._info)
@@ -83,14 +80,7 @@ class CaptureNode(Node):
     def _describe(self, camera: Camera | None, width: int, height: int) -> None:
         """Prepare the camera_info of pictures of this size; without K if it is not known."""
         self._described = camera, width, height
-        self._fault = ''
-        if camera is None:
-            self._fault = 'the camera is not calibrated'
-        elif (camera.lens.width, camera.lens.height) != (width, height):
-            self._fault = (
-                f'the calibration is for {camera.lens.width}x{camera.lens.height} px; '
-                f'the pictures have {width}x{height} px'
-            )
+        self._fault = camera.misfit(width, height) if camera else 'the camera is not calibrated'
         if self._fault:
             self._info = CameraInfo(width=width, height=height)
             self.get_logger().warning(f'{self._fault}: camera_info is published without K')
@@ -132,7 +122,7 @@ class CaptureNode(Node):
         skipped = grabber.skipped + dropped
         self._shedding.tell(report, grabber.frames - dropped, skipped)
         report.values['pictures skipped'] = skipped
-        report.values['pictures broken'] = self._broken
+        self._broken.tell(report)
 
 
 def main() -> int:

@@ -33,6 +33,15 @@ class Camera:
     rectification: tuple[float, ...] = _IDENTITY
     projection: tuple[float, ...] = ()
 
+    def misfit(self, width: int, height: int) -> str:
+        """Say why pictures of a size, px, cannot be of this camera; '' if they can."""
+        if (self.lens.width, self.lens.height) == (width, height):
+            return ''
+        return (
+            f'the calibration is for {self.lens.width}x{self.lens.height} px; '
+            f'the pictures have {width}x{height} px'
+        )
+
     @property
     def projection_matrix(self) -> np.ndarray:
         """P of camera_info, (3, 4) float64."""

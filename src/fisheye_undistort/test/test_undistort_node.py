@@ -9,6 +9,7 @@ import rclpy
 from fisheye_msgs.msg import Projection
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
@@ -29,7 +30,7 @@ PICTURE = np.full((120, 160, 3), 200, np.uint8)
 class Bench:
     """The node between a publisher and subscribers, spun by hand."""
 
-    def __init__(self, name, **parameters):
+    def __init__(self, name, qos=IMAGE, **parameters):
         self._context = rclpy.Context()
         rclpy.init(context=self._context)
         overrides = [Parameter(key, value=value) for key, value in parameters.items()]
@@ -37,8 +38,8 @@ class Bench:
         self.node = UndistortNode(parameter_overrides=overrides, **common)
         self._tester = rclpy.create_node('tester', **common)
         self.pictures, self.projections, self._stamp = [], [], 0
-        self._raw = self._tester.create_publisher(Image, 'image_raw', IMAGE)
-        self._info = self._tester.create_publisher(CameraInfo, 'camera_info', IMAGE)
+        self._raw = self._tester.create_publisher(Image, 'image_raw', qos)
+        self._info = self._tester.create_publisher(CameraInfo, 'camera_info', qos)
         self._tester.create_subscription(Image, 'image_rect', self.pictures.append, IMAGE)
         self._tester.create_subscription(
             Projection, 'projection', self.projections.append, LATCHED
@@ -103,6 +104,11 @@ def test_pictures_are_corrected_and_their_projection_is_told(make_bench):
     assert bench.pictures[-1].header.stamp.nanosec > 0
 
 
+def test_a_camera_that_publishes_best_effort_is_taken_as_such(make_bench):
+    bench = make_bench(qos=QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT))
+    bench.until(lambda: bench.pictures and bench.projections, 'a corrected picture')
+
+
 def test_what_is_seen_is_never_0(make_bench):
     bench = make_bench()
     bench.until(
@@ -164,9 +170,11 @@ def test_unusable_pictures_are_dropped_and_counted(make_bench):
     bench.until(lambda: bench.pictures, 'a picture')
     small = np.zeros((12, 16, 3), np.uint8)
     for sending in ({'encoding': 'mono16'}, {'picture': small}, {'encoding': 'bgra8'}):
-        refused = bench.node._camera.refused
+        refused = bench.node._camera.pictures.dropped.count
         bench.until(
-            lambda before=refused: bench.node._camera.refused > before, 'refusal', **sending
+            lambda before=refused: bench.node._camera.pictures.dropped.count > before,
+            'refusal',
+            **sending,
         )
     count = len(bench.pictures)
     bench.until(lambda: len(bench.pictures) > count, 'a picture again')

@@ -13,13 +13,13 @@ from rclpy.node import Node
 from std_msgs.msg import Header
 
 from fisheye_bridge.awaiting import awaitable
-from fisheye_bridge.diagnostics import ERROR, WARN, Diagnostics, Report, Shedding
+from fisheye_bridge.diagnostics import ERROR, WARN, WARNING_PAUSE_S, Diagnostics, Report, Shedding
 from fisheye_bridge.images import ImageBuffer, converted
 from fisheye_bridge.parameters import Parameters
 from fisheye_bridge.projection import projection_of
 from fisheye_bridge.qos import LATCHED
 from fisheye_bridge.stamps import stamp_of
-from fisheye_bridge.topics import WARNING_PAUSE_S, ImagePublisher
+from fisheye_bridge.topics import ImagePublisher
 from fisheye_capture.rate import Rate
 from fisheye_geometry.errors import FisheyeError, SettingError
 from panorama_stitch.compositor import Compositor

@@ -5,7 +5,7 @@ from dataclasses import fields
 from std_msgs.msg import Header
 
 from fisheye_bridge.camera_topics import CameraSubscription
-from fisheye_bridge.diagnostics import ERROR, Report
+from fisheye_bridge.diagnostics import ERROR, WARN, Dropped, Report
 from fisheye_bridge.parameters import Parameters
 from fisheye_bridge.running import run
 from fisheye_bridge.stamps import ns_of, stamp_of
@@ -98,8 +98,11 @@ class _OwnEye(_Eye):
                 f'{name}.camera_info_url is empty; expected the calibration file of {own.source} '
                 '(calibrate_lens makes one)'
             )
-        self._seen = SeenLens(camera.lens)
+        self._camera, self._seen, self._fault = camera, SeenLens(camera.lens), ''
+        self._broken = Dropped(node, f'a picture of {name}', f'{name} broken')
         self.place(node.settings)
+        if self._grabber.attempts:
+            self._tell(self._grabber.reason)
 
     @property
     def lens(self) -> Lens:
@@ -114,17 +117,25 @@ class _OwnEye(_Eye):
     def report(self, report: Report) -> None:
         grabber = self._grabber
         report.values[f'{self._name} skipped'] = grabber.skipped
-        if grabber.reason:
-            report.add(
-                ERROR,
-                f'{self._name}: {grabber.reason} (attempts to reopen: {grabber.attempts})',
-            )
+        for level, sentence in (
+            (ERROR, grabber.complaint),
+            (WARN, grabber.note),
+            (ERROR, self._fault),
+        ):
+            if sentence:
+                report.add(level, f'{self._name}: {sentence}')
+        self._broken.tell(report)
 
     def _take(self, frame) -> None:
+        fault, self._fault = self._fault, self._camera.misfit(*frame.size)
+        if self._fault:
+            if not fault:
+                self._node.warn(f'{self._name}: {self._fault}')
+            return
         try:
             image, encoding = frame.image, self._settings.encoding
         except FisheyeError as error:
-            self._node.warn(f'{self._name}: a picture was dropped: {error}')
+            self._broken.add(error)
             return
         if self._seen.look(image):
             self.place(self._node.settings)
@@ -135,10 +146,11 @@ class _OwnEye(_Eye):
             self._raw.publish_picture(frame, encoding, header, quality)
 
     def _tell(self, reason: str) -> None:
+        news = f'{self._name}: {self._grabber.news(reason)}'
         if reason:
-            self._node.warn(f'{self._name}: no pictures: {reason}')
+            self._node.warn(news)
         else:
-            self._node.get_logger().info(f'{self._name}: pictures come')
+            self._node.get_logger().info(news)
 
 
 class _TopicEye(_Eye):

@@ -23,7 +23,7 @@ class StitchNode(PanoramaBase):
     def _report(self, report) -> None:
         super()._report(report)
         for eye in self._eyes:
-            report.values[f'{eye.name} refused'] = eye.pictures.refused
+            eye.pictures.dropped.tell(report)
 
 
 class _Eye:
@@ -34,7 +34,9 @@ class _Eye:
         self._node = node
         self._is_placed, self._announced = False, None
         node.create_subscription(Projection, f'{name}/projection', self._take_projection, LATCHED)
-        self.pictures = ImageSubscription(node, f'{name}/image_rect', self._take_image)
+        self.pictures = ImageSubscription(
+            node, f'{name}/image_rect', self._take_image, key=f'{name} refused'
+        )
 
     def _take_projection(self, message) -> None:
         """Take the first projection at once, another one when a picture of its size comes."""
