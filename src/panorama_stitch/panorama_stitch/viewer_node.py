@@ -110,11 +110,13 @@ class ViewerNode(Node):
         if not self._client.service_is_ready():
             raise OverlapError('nobody offers calibrate_overlap: is the stitch node running?')
         said = Future()
-        asked = self._client.call_async(CalibrateOverlap.Request())
+        asked = self._client.call_async(
+            CalibrateOverlap.Request(save=self._declared.settings.save)
+        )
 
         def say(done):
             if said.set_running_or_notify_cancel():
-                said.set_result(_sentence(done.result()))
+                said.set_result(_sentence(done.result(), self._declared.settings.save))
 
         asked.add_done_callback(say)
         return said
@@ -134,10 +136,13 @@ def _entry(overlap: Overlap) -> dict[str, Any]:
     }
 
 
-def _sentence(response: CalibrateOverlap.Response) -> str:
+def _sentence(response: CalibrateOverlap.Response, is_saved: bool) -> str:
     if not response.success:
         return response.message
-    return '; '.join(measured(_entry(overlap)) for overlap in response.overlaps)
+    sentences = [measured(_entry(overlap)) for overlap in response.overlaps]
+    if is_saved and all(overlap.found for overlap in response.overlaps):
+        sentences.append('saved')
+    return '; '.join(sentences)
 
 
 def main() -> int:

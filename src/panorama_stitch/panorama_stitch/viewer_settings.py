@@ -15,6 +15,9 @@ class ViewerSettings:
         'that is printed at start.',
     )
     port: int = setting(8080, 'Port to serve on; 0: a free one.', minimum=0, maximum=65535)
+    save: bool = setting(
+        False, 'Calibrate also saves the overlap, in the overlap_file of the node that stitches.'
+    )
     max_clients: int = setting(8, 'Browsers that may look at once.', minimum=1, maximum=100)
     stale_after_s: float = setting(
         1.0,

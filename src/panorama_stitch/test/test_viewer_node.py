@@ -215,11 +215,12 @@ def press_calibrate(node):
     return visit(press)
 
 
-def test_the_button_has_the_overlap_measured(ros):
-    stitching, node = Stitching(ros.context), viewer(ros, port=0)
+@pytest.mark.parametrize('save', [False, True])
+def test_the_button_has_the_overlap_measured(ros, save):
+    stitching, node = Stitching(ros.context), viewer(ros, port=0, save=save)
 
     def calibrate(request, response):
-        response.success = request.method == ''
+        response.success = (request.method, request.save) == ('', save)
         response.overlaps = [
             Overlap(
                 left_camera='left',
@@ -233,7 +234,7 @@ def test_the_button_has_the_overlap_measured(ros):
 
     stitching.create_service(CalibrateOverlap, 'calibrate_overlap', calibrate)
     ros.start(stitching, node)
-    words = 'left and right overlap, 140.2° apart (confidence 0.90)'
+    words = 'left and right overlap, 140.2° apart (confidence 0.90)' + '; saved' * save
     wait_for(lambda: press_calibrate(node) == (200, words))
 
 
