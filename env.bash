@@ -9,6 +9,7 @@ fi
 export RMW_IMPLEMENTATION="${RMW_IMPLEMENTATION:-rmw_fastrtps_cpp}"
 export ROS_AUTOMATIC_DISCOVERY_RANGE="${ROS_AUTOMATIC_DISCOVERY_RANGE:-LOCALHOST}"
 export ROS_LOG_DIR="${ROS_LOG_DIR:-$_fisheye/log/ros}"
+export FISHEYE_DATA="${FISHEYE_DATA:-$_fisheye/../shared/data}"  # real pictures, for tests and benchmarks
 export MPLCONFIGDIR="${MPLCONFIGDIR:-$_fisheye/.venv/matplotlib}"  # its caches, else in your home
 
 # colcon's and ament's scripts read variables that may be unset.

@@ -10,6 +10,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
+from health import usage
 from pairs import SIDES, synthetic_pair
 from rig import Rig, camera_parameters, unused_domain, wait_for
 from targets import Target
@@ -145,7 +146,7 @@ def run_rig(setup: Setup, seconds: float, log_folder: Path) -> Run:
         cameras = camera_parameters(save_pair(Path(folder), setup.size))
         counts = Counts(watcher)
         begin = time.monotonic()
-        start(rig, cameras, setup)
+        rig.start_all(setup.composed, cameras, setup.prefix, frame_rate_hz=setup.frame_rate_hz)
         wait_for(lambda: rig.check_alive() or watcher.newest, START_TIMEOUT_S, 'a first panorama')
         first_s = time.monotonic() - begin
         begin = time.monotonic()
@@ -169,18 +170,9 @@ def run_rig(setup: Setup, seconds: float, log_folder: Path) -> Run:
             lost=counts.lost,
             missing=None if is_free else due - len(stamps_ns),
             cpu_ms=used_s / len(stamps_ns) * 1e3,
-            memory_mib=max(memory_mib(process.pid) for process in rig.processes.values()),
+            memory_mib=max(usage(process.pid).resident_mib for process in rig.processes.values()),
             calibration_s=calibration_s,
         )
-
-
-def start(rig: Rig, cameras: dict[str, dict[str, object]], setup: Setup) -> None:
-    """Start the nodes."""
-    if not setup.composed:
-        rig.start_all(False, cameras, frame_rate_hz=setup.frame_rate_hz)
-        return
-    own = {f'{side}.{name}': v for side, entries in cameras.items() for name, v in entries.items()}
-    rig.start('panorama', setup.prefix, **own, frame_rate_hz=setup.frame_rate_hz)
 
 
 def save_pair(folder: Path, size: tuple[int, int]) -> Path:
@@ -200,11 +192,3 @@ def cpu_s(rig: Rig) -> float:
 def _ticks(pid: int) -> int:
     fields = Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()
     return int(fields[11]) + int(fields[12])
-
-
-def memory_mib(pid: int) -> float:
-    """Resident memory of a process."""
-    for line in Path(f'/proc/{pid}/status').read_text().splitlines():
-        if line.startswith('VmRSS:'):
-            return int(line.split()[1]) / 1024
-    return 0.0

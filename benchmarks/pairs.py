@@ -22,7 +22,7 @@ from panorama_stitch.stitcher import Stitcher
 
 SIDES = ('left', 'right')
 YAWS = radians(-70), radians(70)
-DATA = Path(os.environ.get('FISHEYE_DATA', Path(__file__).parents[2] / 'shared' / 'data'))
+DATA = Path(os.environ.get('FISHEYE_DATA', ''))
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from field import Field
 from rig import Rig, unused_domain
 from watcher import Watcher
 
-DATA = Path(os.environ.get('FISHEYE_DATA', Path(__file__).parents[2] / 'shared' / 'data'))
+DATA = Path(os.environ.get('FISHEYE_DATA', ''))
 
 
 @pytest.fixture

@@ -109,18 +109,24 @@ class Rig:
                 stdin=subprocess.DEVNULL,
             )
 
-    def start_all(self, composed: bool, cameras: dict[str, dict[str, object]], **capture: object):
+    def start_all(
+        self,
+        composed: bool,
+        cameras: dict[str, dict[str, object]],
+        prefix: tuple[str, ...] = (),
+        **capture: object,
+    ) -> None:
         """Start a whole rig: `cameras` of `camera_parameters`, `capture` for both captures."""
         if composed:
             own = {
                 f'{s}.{name}': v for s, entries in cameras.items() for name, v in entries.items()
             }
-            self.start('panorama', **own, **capture)
+            self.start('panorama', prefix, **own, **capture)
             return
         for side, entries in cameras.items():
-            self.start(f'{side}/capture', **entries, **capture)
-            self.start(f'{side}/undistort')
-        self.start('stitch')
+            self.start(f'{side}/capture', prefix, **entries, **capture)
+            self.start(f'{side}/undistort', prefix)
+        self.start('stitch', prefix)
 
     def stop(self, node: str, with_signal: signal.Signals = signal.SIGINT) -> tuple[int, float]:
         """End a node; give its exit code and how long it took, s."""

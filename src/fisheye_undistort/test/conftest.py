@@ -11,7 +11,7 @@ from fisheye_undistort.lens_fit import View
 from fisheye_undistort.rendered_view import render_view, scattered_poses
 from fisheye_undistort.target import STANDARD
 
-DATA = Path(os.environ.get('FISHEYE_DATA', Path(__file__).parents[4] / 'shared' / 'data'))
+DATA = Path(os.environ.get('FISHEYE_DATA', ''))
 
 
 def fisheye(fov_deg: int, scale: int = 1) -> FisheyeLens:

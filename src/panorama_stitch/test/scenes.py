@@ -15,7 +15,7 @@ from fisheye_geometry.remap import LEVEL, RemapTable, Turn
 from fisheye_geometry.surface import Surface, surface_for
 from panorama_stitch.view import View
 
-DATA = Path(os.environ.get('FISHEYE_DATA', Path(__file__).parents[4] / 'shared' / 'data'))
+DATA = Path(os.environ.get('FISHEYE_DATA', ''))
 YAW_DEG = 140.0
 _AROUND = 2048
 
