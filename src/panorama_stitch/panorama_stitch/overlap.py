@@ -6,15 +6,15 @@ the overlap tile by tile, and the winner is refined to a fraction of a pixel.
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import degrees, isnan, nan, radians
+from math import isnan, nan, radians
 
 import cv2
 import numpy as np
 
 from fisheye_geometry.errors import OverlapError
 from fisheye_geometry.surface import Surface
-from panorama_stitch import paper
-from panorama_stitch.overlap_result import Overlap, apart_rad, side_by_side
+from panorama_stitch import overlap_words, paper
+from panorama_stitch.overlap_result import Overlap, side_by_side
 from panorama_stitch.overlap_settings import METHODS, OverlapSettings
 from panorama_stitch.particles import Particle
 from panorama_stitch.registration import Registration, Search, fit_at, register
@@ -182,8 +182,10 @@ class _Measurement:
             turn=found.pose.turn,
             overlap_px=max(0.0, min(self._surfaces[0].width - x, self._surfaces[1].width)),
             confidence=found.confidence,
-            message=self._describe(found),
         )
+        rival_x_px = found.rival_x_px + self._half_start if found.distinct < 1 else nan
+        words = overlap_words.description(overlap, *self._surfaces, rival_x_px)
+        overlap = replace(overlap, message=words)
         if found.proposals is None:
             return overlap
         n, m = found.match
@@ -206,33 +208,10 @@ class _Measurement:
         needed = self._settings.min_confidence
         message = f'no common scene: confidence {found.confidence:.2f}, {needed:.2f} is needed'
         if found.rival_fit >= needed:
-            here, there = (self._where(x) for x in (found.pose.x_px, found.rival_x_px))
-            message = (
-                f'the scene repeats itself: {here} and {there} fit alike; set expected_yaw_deg or '
-                'show the cameras something unique'
-            )
+            offsets = found.pose.x_px + self._half_start, found.rival_x_px + self._half_start
+            message = overlap_words.repetition(*offsets, *self._surfaces)
         aside = side_by_side(self._surfaces[0], method, message)
         return replace(aside, confidence=found.confidence)
-
-    def _describe(self, found: Registration) -> str:
-        pose = found.pose
-        parts = [f'the right view begins at {self._where(pose.x_px)}']
-        rise = pose.y_px - (self._surfaces[0].center_y_px - self._surfaces[1].center_y_px)
-        if abs(rise) >= 0.5:
-            parts.append(f'{abs(rise):.1f} px {"lower" if rise > 0 else "higher"} than level')
-        pitch, roll = degrees(pose.pitch_rad), degrees(pose.roll_rad)
-        if max(abs(pitch), abs(roll)) >= 0.05:
-            parts.append(f'its camera pitched by {pitch:.2f} and rolled by {roll:.2f} degrees')
-        parts.append(f'confidence {found.confidence:.2f}')
-        if found.distinct < 1:
-            parts.append(f'though {self._where(found.rival_x_px)} fits nearly as well')
-        return ', '.join(parts)
-
-    def _where(self, x_px: float) -> str:
-        """Offset of a facing half in words: px of the frame, and degrees where there are any."""
-        text = f'{x_px + self._half_start:.1f} px'
-        apart = apart_rad(x_px + self._half_start, *self._surfaces)
-        return text if isnan(apart) else f'{text} ({degrees(apart):.2f} degrees)'
 
 
 def _grey(picture: np.ndarray) -> np.ndarray:
