@@ -9,11 +9,9 @@ from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
 from fisheye_geometry.coded_picture import decoded
+from fisheye_geometry.encodings import CHANNELS, converted
 from fisheye_geometry.errors import ImageFormatError
 from fisheye_geometry.lens import MAX_PICTURE_SIDE_PX
-
-CHANNELS = {'bgr8': 3, 'rgb8': 3, 'mono8': 1}
-"""The encodings that the nodes work in and publish."""
 
 
 @dataclass(frozen=True)
@@ -144,9 +142,8 @@ def to_jpeg(image: np.ndarray, encoding: str, header: Header, quality: int) -> C
     quality
         JPEG quality, 1 to 100.
     """
-    if encoding == 'rgb8':
-        image = cv2.cvtColor(image, cv2.COLOR_RGB2BGR)
-    _, coded = cv2.imencode('.jpg', image, (cv2.IMWRITE_JPEG_QUALITY, quality))
+    stored = converted(image, encoding, 'mono8' if encoding == 'mono8' else 'bgr8')
+    _, coded = cv2.imencode('.jpg', stored, (cv2.IMWRITE_JPEG_QUALITY, quality))
     return jpeg_message(coded, encoding, header)
 
 
@@ -171,20 +168,3 @@ def from_jpeg(message: CompressedImage) -> tuple[np.ndarray, str]:
     grey = message.format.startswith('mono8')
     image = decoded(np.frombuffer(message.data, np.uint8), grey=grey)
     return image, 'mono8' if grey else 'bgr8'
-
-
-_COLOR_CHANGES = {
-    ('rgb8', 'bgr8'): cv2.COLOR_RGB2BGR,
-    ('bgr8', 'rgb8'): cv2.COLOR_BGR2RGB,
-    ('mono8', 'bgr8'): cv2.COLOR_GRAY2BGR,
-    ('mono8', 'rgb8'): cv2.COLOR_GRAY2RGB,
-    ('bgr8', 'mono8'): cv2.COLOR_BGR2GRAY,
-    ('rgb8', 'mono8'): cv2.COLOR_RGB2GRAY,
-}
-
-
-def converted(image: np.ndarray, encoding: str, wanted: str) -> np.ndarray:
-    """Give a picture in another of the encodings in `CHANNELS`, itself if it is in that."""
-    if encoding == wanted:
-        return image
-    return cv2.cvtColor(image, _COLOR_CHANGES[encoding, wanted])

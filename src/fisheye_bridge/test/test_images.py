@@ -9,14 +9,13 @@ from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
 from fisheye_bridge.images import (
-    CHANNELS,
     ImageBuffer,
-    converted,
     from_jpeg,
     to_array,
     to_jpeg,
     to_message,
 )
+from fisheye_geometry.encodings import CHANNELS, converted
 from fisheye_geometry.errors import ImageFormatError
 
 COLORS = np.zeros((8, 12, 3), np.uint8)

@@ -5,11 +5,11 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 
-import cv2
 import numpy as np
 
 from fisheye_geometry.camera_file import Camera
 from fisheye_geometry.coded_picture import decoded
+from fisheye_geometry.encodings import converted
 from fisheye_geometry.errors import SourceError
 
 
@@ -100,11 +100,6 @@ def shown_source(source: str) -> str:
     return re.sub('://[^/]*@', '://', source)
 
 
-_FROM_COLOR = {'rgb8': cv2.COLOR_BGR2RGB, 'mono8': cv2.COLOR_BGR2GRAY}
-_FROM_GREY = {'rgb8': cv2.COLOR_GRAY2RGB, 'bgr8': cv2.COLOR_GRAY2BGR}
-
-
 def encoded(image: np.ndarray, encoding: str) -> np.ndarray:
     """Turn OpenCV's picture, (height, width[, 3]) grey or BGR, into one of an encoding."""
-    conversion = (_FROM_GREY if image.ndim == 2 else _FROM_COLOR).get(encoding)
-    return image if conversion is None else cv2.cvtColor(image, conversion)
+    return converted(image, 'mono8' if image.ndim == 2 else 'bgr8', encoding)

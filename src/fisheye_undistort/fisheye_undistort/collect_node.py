@@ -3,13 +3,13 @@
 import sys
 import time
 
-import cv2
 import rclpy
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from fisheye_bridge.topics import ImageSubscription
+from fisheye_geometry.encodings import converted
 from fisheye_geometry.errors import SettingError, SourceError
 from fisheye_undistort.collector import Collector
 from fisheye_undistort.pictures import Picture, cut
@@ -18,7 +18,6 @@ _LONGEST_WAIT_S = 10.0
 """Without a picture for so long there is nobody to wait for."""
 _LINE = 120
 """Characters of the progress line."""
-_GRAY = {'bgr8': cv2.COLOR_BGR2GRAY, 'rgb8': cv2.COLOR_RGB2GRAY}
 
 
 class CollectNode(Node):
@@ -35,8 +34,7 @@ class CollectNode(Node):
     def _look(self, image, encoding, header):
         self.last_s = time.monotonic()
         self._count += 1
-        gray = cv2.cvtColor(image, _GRAY[encoding]) if image.ndim == 3 else image
-        gray = cut(gray, self._half)
+        gray = cut(converted(image, encoding, 'mono8'), self._half)
         self._collector.add(Picture(f'picture {self._count}', gray, moving=True))
         line = f'{self._collector.progress()}: {self._collector.state or "taken"}'
         print(f'\r{line:{_LINE}.{_LINE}}', end='', file=sys.stderr, flush=True)

@@ -11,11 +11,11 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 
-from fisheye_bridge.images import converted
 from fisheye_bridge.projection import surface_of
 from fisheye_bridge.qos import LATCHED
 from fisheye_bridge.stamps import ns_of
 from fisheye_bridge.topics import ImageSubscription
+from fisheye_geometry.encodings import converted
 from fisheye_geometry.errors import FisheyeError, SourceError
 from panorama_stitch.snapshot import FORMATS, save
 

@@ -1,0 +1,37 @@
+"""The pixel encodings that the nodes work in, by the names that ROS gives them."""
+
+import cv2
+import numpy as np
+
+CHANNELS = {'bgr8': 3, 'rgb8': 3, 'mono8': 1}
+"""The encodings, each with its number of channels."""
+
+_CHANGES = {
+    ('rgb8', 'bgr8'): cv2.COLOR_RGB2BGR,
+    ('bgr8', 'rgb8'): cv2.COLOR_BGR2RGB,
+    ('mono8', 'bgr8'): cv2.COLOR_GRAY2BGR,
+    ('mono8', 'rgb8'): cv2.COLOR_GRAY2RGB,
+    ('bgr8', 'mono8'): cv2.COLOR_BGR2GRAY,
+    ('rgb8', 'mono8'): cv2.COLOR_RGB2GRAY,
+}
+
+
+def converted(image: np.ndarray, encoding: str, wanted: str) -> np.ndarray:
+    """Give a picture in another encoding.
+
+    Parameters
+    ----------
+    image
+        (height, width[, 3]) uint8.
+    encoding, wanted
+        That of the picture and the other one, both of `CHANNELS`.
+
+    Returns
+    -------
+    ndarray
+        (height, width, 3) or, as mono8, (height, width) uint8; `image` itself if it is in the
+        wanted encoding.
+    """
+    if encoding == wanted:
+        return image
+    return cv2.cvtColor(image, _CHANGES[encoding, wanted])
