@@ -11,12 +11,7 @@ from fisheye_capture.pace import PacedSource
 from fisheye_capture.settings import CaptureSettings
 from fisheye_capture.source import SourceEndedError, encoded
 from fisheye_geometry.errors import SourceError
-
-PICTURE_SUFFIXES = frozenset(
-    {'.bmp', '.jp2', '.jpeg', '.jpg', '.pbm', '.pgm', '.png', '.ppm', '.tif', '.tiff', '.webp'}
-)
-# The pixels as the sensor gave them: a calibration knows nothing of a turned picture.
-_AS_TAKEN = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
+from fisheye_geometry.picture_file import read_picture
 
 
 class PictureSource(PacedSource):
@@ -24,7 +19,7 @@ class PictureSource(PacedSource):
 
     def __init__(self, settings: CaptureSettings, path: Path):
         super().__init__(settings.frame_rate_hz)
-        self._image = encoded(_read(path), settings.encoding)
+        self._image = encoded(read_picture(path), settings.encoding)
         self._image.setflags(write=False)
 
     def _picture(self, stamp_ns):
@@ -58,7 +53,7 @@ def folder_pictures(paths: Sequence[Path], loop: bool) -> Iterator[tuple[str, np
     """Give pictures in turn; a `SourceError` for one that cannot be read."""
     while True:
         for path in paths:
-            yield str(path), _read(path)
+            yield str(path), read_picture(path)
         if not loop:
             return
 
@@ -76,14 +71,3 @@ def video_pictures(path: Path, loop: bool) -> Iterator[tuple[str, np.ndarray]]:
             raise SourceError(f'{path} cannot be read as a video or a picture')
         if not loop:
             return
-
-
-def _read(path: Path) -> np.ndarray:
-    try:
-        image = cv2.imread(str(path), _AS_TAKEN)
-    except cv2.error:
-        # OpenCV refuses pictures that are too large this way.
-        image = None
-    if image is None:
-        raise SourceError(f'{path} cannot be read as a picture')
-    return image

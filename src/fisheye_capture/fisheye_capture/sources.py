@@ -2,11 +2,9 @@
 
 import os
 import re
-from glob import glob
 from pathlib import Path
 
 from fisheye_capture.files import (
-    PICTURE_SUFFIXES,
     PictureSource,
     SequenceSource,
     folder_pictures,
@@ -18,6 +16,7 @@ from fisheye_capture.source import Source, shown_source
 from fisheye_capture.stream import StreamSource
 from fisheye_capture.synthetic import SyntheticSource
 from fisheye_geometry.errors import SourceError
+from fisheye_geometry.picture_file import is_picture, pictures_in
 
 _STREAMS = ('http', 'https', 'rtsp', 'rtsps', 'udp')
 
@@ -50,21 +49,13 @@ def open_source(settings: CaptureSettings) -> Source:
 
 def _open_files(settings: CaptureSettings, name: str) -> Source:
     if os.path.isfile(name):
-        if _is_picture(name):
+        if is_picture(name):
             return PictureSource(settings, Path(name))
         return SequenceSource(settings, video_pictures(Path(name), settings.loop))
-    pattern = os.path.join(name, '*') if os.path.isdir(name) else name
-    paths = sorted(glob(pattern, recursive=True))
-    pictures = [Path(path) for path in paths if _is_picture(path)]
+    pictures = pictures_in(name)
     if pictures:
         return SequenceSource(settings, folder_pictures(pictures, settings.loop))
-    if paths or os.path.isdir(name):
-        raise SourceError(f'there is no picture in {name}')
     raise SourceError(
         f"source '{settings.source}' is not there; expected synthetic, a device, a picture, a "
         'folder or glob of pictures, a video, or an http, rtsp or udp URL'
     )
-
-
-def _is_picture(name: str) -> bool:
-    return os.path.splitext(name)[1].lower() in PICTURE_SUFFIXES

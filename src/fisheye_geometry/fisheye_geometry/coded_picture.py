@@ -54,10 +54,7 @@ def whole_jpeg(coded: np.ndarray) -> np.ndarray | None:
 
 
 def decoded(coded: np.ndarray, *, grey: bool = False) -> np.ndarray:
-    """Decode a JPEG or PNG, (n,) uint8, to (height, width, 3) BGR or (height, width), uint8.
-
-    The pixels come as the sensor gave them, whatever EXIF says of the camera's orientation: a
-    calibration knows nothing of a turned picture.
+    """Decode a JPEG or PNG as `pixels_of` does, if its head claims a size that is possible.
 
     Raises
     ------
@@ -69,13 +66,44 @@ def decoded(coded: np.ndarray, *, grey: bool = False) -> np.ndarray:
         raise ImageFormatError(
             f'a picture of {width}x{height} px; expected up to {_MAX_PIXELS / 1e6:g} million px'
         )
+    image = pixels_of(coded, grey=grey)
+    if image.shape[:2] != (height, width):
+        raise ImageFormatError(
+            f'a picture of {image.shape[1]}x{image.shape[0]} px claims {width}x{height} px'
+        )
+    return image
+
+
+def pixels_of(coded: np.ndarray, *, grey: bool = False) -> np.ndarray:
+    """Decode a picture of any kind, its pixels as the sensor gave them.
+
+    What EXIF says of the camera's orientation is left aside: a calibration knows nothing of a
+    turned picture.
+
+    Parameters
+    ----------
+    coded
+        (n,) uint8.
+    grey
+        Whether it is wanted without colour.
+
+    Returns
+    -------
+    ndarray
+        (height, width, 3) uint8 BGR, or (height, width) uint8.
+
+    Raises
+    ------
+    ImageFormatError
+        If it is broken, of no known kind, or too large for OpenCV.
+    """
     kind = cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR
     try:
-        image = cv2.imdecode(coded, kind | cv2.IMREAD_IGNORE_ORIENTATION)
+        image = cv2.imdecode(coded, kind | cv2.IMREAD_IGNORE_ORIENTATION) if coded.size else None
     except cv2.error:
         image = None
-    if image is None or image.shape[:2] != (height, width):
-        raise ImageFormatError(f'a broken picture of {width}x{height} px ({coded.size} bytes)')
+    if image is None:
+        raise ImageFormatError(f'{coded.size} bytes are a broken picture')
     return image
 
 

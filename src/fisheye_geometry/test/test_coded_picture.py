@@ -51,7 +51,7 @@ def test_a_picture_that_is_not_as_large_as_it_claims_is_refused():
     hidden = b'\xff\xd0' + len(coded).to_bytes(2, 'big') + coded[2:]
     false = np.frombuffer(coded[:2] + hidden + claim, np.uint8)
     assert size_of(false) == (16, 8)
-    with pytest.raises(ImageFormatError, match='a broken picture of 16x8 px'):
+    with pytest.raises(ImageFormatError, match='a picture of 53x37 px claims 16x8 px'):
         decoded(false)
 
 

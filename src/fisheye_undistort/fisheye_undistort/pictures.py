@@ -3,20 +3,18 @@
 import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from glob import glob
 from pathlib import Path
 
 import cv2
 import numpy as np
 
 from fisheye_geometry.errors import SourceError
+from fisheye_geometry.picture_file import SUFFIXES, is_picture, pictures_in, read_picture
 
 HALVES = ('left', 'right')
 
-_PICTURES = ('.png', '.jpg', '.jpeg', '.bmp', '.tif', '.tiff', '.webp', '.pgm', '.ppm')
-_VIDEOS = ('.mp4', '.avi', '.mkv', '.mov', '.webm', '.m4v', '.mjpg', '.mjpeg')
-# The pixels as the sensor gave them: nodes that use the calibration do not turn pictures either.
-_AS_TAKEN = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION
+_VIDEOS = frozenset({'.mp4', '.avi', '.mkv', '.mov', '.webm', '.m4v', '.mjpg', '.mjpeg'})
+"""What is taken from a folder or glob besides pictures."""
 _LOOKS_PER_SECOND = 10
 """Frames of a video that are looked at; a hand does not hold a sheet still for less."""
 
@@ -56,8 +54,8 @@ def read_pictures(paths: Iterable[str | Path], half: str = '') -> Iterator[Pictu
         If there is nothing, or something that cannot be read; the sentence names it.
     """
     for path in _expand(paths):
-        frames = _frames(path) if path.suffix.lower() in _VIDEOS else [_picture(path)]
-        for picture in frames:
+        pictures = [_picture(path)] if is_picture(path) else _frames(path)
+        for picture in pictures:
             yield Picture(picture.name, cut(picture.gray, half), picture.moving)
 
 
@@ -71,33 +69,15 @@ def cut(gray: np.ndarray, half: str) -> np.ndarray:
 def _expand(paths: Iterable[str | Path]) -> list[Path]:
     found = []
     for path in paths:
-        if os.path.isdir(path):
-            inside = sorted(p for p in Path(path).iterdir() if p.suffix.lower() in _PICTURES)
-            if not inside:
-                raise SourceError(f'the folder {path} has no pictures ({", ".join(_PICTURES)})')
-            found += inside
-        elif os.path.exists(path):
-            found.append(Path(path))
-        else:
-            matching = sorted(map(Path, glob(str(path), recursive=True)))
-            if not matching:
-                raise SourceError(f'{path} is not there, neither a file nor a folder nor a glob')
-            found += matching
+        inside = [Path(path)] if os.path.isfile(path) else pictures_in(path, SUFFIXES | _VIDEOS)
+        if not inside:
+            raise SourceError(f'{path} is not there, neither a file nor a folder nor a glob')
+        found += inside
     return found
 
 
 def _picture(path: Path) -> Picture:
-    try:
-        content = np.frombuffer(path.read_bytes(), np.uint8)
-    except OSError as error:
-        raise SourceError(f'{path} cannot be read: {error.strerror}') from error
-    try:
-        gray = cv2.imdecode(content, _AS_TAKEN) if len(content) else None
-    except cv2.error:
-        gray = None  # OpenCV refuses pictures that are too large this way.
-    if gray is None:
-        raise SourceError(f'{path} is not a picture that can be read')
-    return Picture(path.name, gray)
+    return Picture(path.name, read_picture(path, grey=True))
 
 
 def _frames(path: Path) -> Iterator[Picture]:

@@ -85,5 +85,5 @@ def test_what_cannot_be_read_is_named(name, content, told, tmp_path):
 
 
 def test_a_folder_without_pictures(tmp_path):
-    with pytest.raises(SourceError, match='has no pictures'):
+    with pytest.raises(SourceError, match='there is no picture in'):
         list(read_pictures([tmp_path]))
