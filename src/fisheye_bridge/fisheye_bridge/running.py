@@ -4,6 +4,10 @@ import os
 import signal
 import threading
 import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from time import monotonic
+from typing import Any, TypeVar
 
 import rclpy
 from rclpy.exceptions import ParameterException
@@ -14,6 +18,8 @@ from rclpy.signals import SignalHandlerOptions
 
 from fisheye_bridge import shared_memory
 from fisheye_geometry.errors import FisheyeError
+
+_Node = TypeVar('_Node', bound=Node)
 
 _LONGEST_WAIT_S = 0.2
 """A signal is noticed after so long at the latest."""
@@ -50,12 +56,8 @@ def run(node_class: type[Node]) -> int:
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, end)
-    complaint = shared_memory.prepare()
     try:
-        # rclpy's own handlers would end the context while threads of the node still publish.
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-        if complaint:
-            get_logger(node_class.__name__).warning(complaint)
+        _init(node_class)
         node = node_class()
         executor = SingleThreadedExecutor()
         executor.add_node(node)
@@ -73,6 +75,45 @@ def run(node_class: type[Node]) -> int:
             node.destroy_node()
         rclpy.try_shutdown()
     return 0
+
+
+@contextmanager
+def started(node_class: type[_Node], *arguments: Any) -> Iterator[_Node]:
+    """Give a node to a command, which spins it itself and is ended by a KeyboardInterrupt.
+
+    Parameters
+    ----------
+    node_class, *arguments
+        What to build, of what.
+    """
+    node = None
+    try:
+        _init(node_class)
+        node = node_class(*arguments)
+        yield node
+    finally:
+        if node:
+            node.destroy_node()
+        rclpy.try_shutdown()
+
+
+def spin_until(node: Node, condition: Callable[[], bool], timeout_s: float) -> bool:
+    """Spin until a condition holds; tell whether it did within `timeout_s`."""
+    deadline_s = monotonic() + timeout_s
+    while not condition():
+        if monotonic() > deadline_s:
+            return False
+        rclpy.spin_once(node, timeout_sec=_LONGEST_WAIT_S)
+    return True
+
+
+def _init(node_class: type[Node]) -> None:
+    """Make the first steps, in the order in which they must come."""
+    complaint = shared_memory.prepare()
+    # rclpy's own handlers would end the context while threads of the node still publish.
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    if complaint:
+        get_logger(node_class.__name__).warning(complaint)
 
 
 def _give_up(arguments) -> None:

@@ -3,16 +3,14 @@
 import argparse
 import sys
 from pathlib import Path
-from time import monotonic
 
-import rclpy
 from fisheye_msgs.msg import Projection
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 
 from fisheye_bridge.projection import surface_of
 from fisheye_bridge.qos import LATCHED
+from fisheye_bridge.running import spin_until, started
 from fisheye_bridge.stamps import ns_of
 from fisheye_bridge.topics import ImageSubscription
 from fisheye_geometry.encodings import converted
@@ -46,6 +44,13 @@ class SnapshotNode(Node):
             image = converted(image, encoding, 'mono8' if encoding == 'mono8' else 'bgr8')
             self.taken = image, surface, ns_of(header.stamp)
 
+    def wait(self, timeout_s: float) -> tuple:
+        """Spin until a panorama was taken; a `SourceError` if none comes."""
+        if not spin_until(self, lambda: self.taken is not None, timeout_s):
+            topic = self.resolve_topic_name('panorama/image')
+            raise SourceError(f'no panorama came on {topic} within {timeout_s:g} s')
+        return self.taken
+
 
 def parse() -> argparse.Namespace:
     """Read the command line."""
@@ -62,32 +67,17 @@ def parse() -> argparse.Namespace:
     return parser.parse_args(remove_ros_args(sys.argv)[1:])
 
 
-def wait(node: SnapshotNode, timeout_s: float) -> tuple:
-    """Spin until a panorama was taken; a `SourceError` if none comes."""
-    deadline = monotonic() + timeout_s
-    while node.taken is None:
-        rclpy.spin_once(node, timeout_sec=0.1)
-        if monotonic() > deadline:
-            topic = node.resolve_topic_name('panorama/image')
-            raise SourceError(f'no panorama came on {topic} within {timeout_s:g} s')
-    return node.taken
-
-
 def main() -> int:
     """Save a panorama and say where."""
     arguments = parse()
-    rclpy.init()
-    node = SnapshotNode()
     try:
-        taken = wait(node, arguments.timeout)
+        with started(SnapshotNode) as node:
+            taken = node.wait(arguments.timeout)
         for path in save(arguments.out, arguments.format, *taken):
             print(f'Saved {path}')
     except FisheyeError as error:
         print(f'snapshot: {error}', file=sys.stderr)
         return 1
-    except (KeyboardInterrupt, ExternalShutdownException):
+    except KeyboardInterrupt:
         return 130
-    finally:
-        node.destroy_node()
-        rclpy.try_shutdown()
     return 0

@@ -8,12 +8,13 @@ from rclpy.executors import SingleThreadedExecutor
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
+from fisheye_bridge import shared_memory
 from fisheye_bridge.images import to_message
 from fisheye_bridge.projection import projection_of
 from fisheye_bridge.qos import IMAGE, LATCHED
 from fisheye_bridge.stamps import stamp_of
 from fisheye_geometry.surface import Surface
-from panorama_stitch.snapshot_node import SnapshotNode
+from panorama_stitch.snapshot_node import SnapshotNode, main
 
 SURFACE = Surface('cylindrical', 32, 12, 10.0, 15.5, 5.5)
 PANORAMA = np.full((12, 32, 3), (10, 20, 30), np.uint8)
@@ -48,3 +49,14 @@ def test_a_panorama_is_taken_with_its_surface_and_any_stamp(context, stamp_ns):
     assert (surface, taken_ns) == (SURFACE, stamp_ns)
     for ended in (node, stitching):
         ended.destroy_node()
+
+
+def test_the_command_says_that_no_panorama_came(monkeypatch, capsys):
+    prepared = []
+    monkeypatch.setattr(shared_memory, 'prepare', lambda: prepared.append(True) or '')
+    monkeypatch.setattr('sys.argv', ['snapshot', '--timeout', '0.1'])
+    assert main() == 1
+    assert (
+        capsys.readouterr().err == 'snapshot: no panorama came on /panorama/image within 0.1 s\n'
+    )
+    assert prepared, 'shared memory of killed nodes is cleared'
