@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
+from rendered_view import render_view, scattered_poses
 
 from fisheye_geometry.lens import FisheyeLens
 from fisheye_undistort.calibration import calibrate
 from fisheye_undistort.detection import Detector
-from fisheye_undistort.rendered_view import render_view, scattered_poses
 from fisheye_undistort.target import STANDARD, Target
 
 VIEWS = 12

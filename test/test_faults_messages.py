@@ -10,12 +10,13 @@ from fisheye_msgs.msg import Projection
 from health import usage
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
+from image_message import to_message
 from messages import camera_infos, compressed_images, images, projections
 from rig import wait_for
 from sensor_msgs.msg import CompressedImage, Image
 
 from fisheye_bridge.camera_info import camera_of
-from fisheye_bridge.images import from_jpeg, to_message
+from fisheye_bridge.images import from_jpeg
 from fisheye_bridge.qos import IMAGE, LATCHED
 from fisheye_bridge.stamps import stamp_of
 from fisheye_geometry.errors import FisheyeError

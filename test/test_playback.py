@@ -5,13 +5,13 @@ import threading
 import numpy as np
 import pytest
 import rclpy
+from image_message import to_message
 from rig import wait_for
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
 from fisheye_bridge.camera_info import camera_info_of
-from fisheye_bridge.images import to_message
 from fisheye_bridge.qos import IMAGE
 from fisheye_bridge.stamps import stamp_of
 from fisheye_capture.scene import Scene

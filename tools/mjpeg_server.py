@@ -43,11 +43,6 @@ class MjpegServer:
         self.port = self._server.server_port
 
     @property
-    def is_stopped(self) -> bool:
-        """Whether the camera is off."""
-        return self._stopping.is_set()
-
-    @property
     def url(self) -> str:
         """Where the camera is."""
         return f'http://127.0.0.1:{self.port}/stream'

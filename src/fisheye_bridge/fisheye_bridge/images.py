@@ -118,18 +118,6 @@ class ImageBuffer:
         return (width, height, encoding) == (message.width, message.height, message.encoding)
 
 
-def to_message(image: np.ndarray, encoding: str, header: Header) -> Image:
-    """Copy an array (height, width[, 3]) uint8 into a new message."""
-    height, width = image.shape[:2]
-    message = Image(header=header, width=width, height=height, encoding=encoding)
-    message.step = width * CHANNELS[encoding]
-    # A bytes object or a list in place of the array makes the setter check every byte.
-    data = array('B')
-    data.frombytes(memoryview(np.ascontiguousarray(image)).cast('B'))
-    message.data = data
-    return message
-
-
 def to_jpeg(image: np.ndarray, encoding: str, header: Header, quality: int) -> CompressedImage:
     """Encode an array as the message that image_transport's `compressed` plugin reads.
 

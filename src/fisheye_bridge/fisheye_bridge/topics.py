@@ -14,8 +14,6 @@ from fisheye_bridge.images import ImageBuffer, from_jpeg, jpeg_message, to_array
 from fisheye_bridge.qos import ADJUSTABLE, BEST_EFFORT_INPUT, IMAGE, IMAGE_INPUT
 from fisheye_geometry.errors import FisheyeError
 
-TRANSPORTS = ('raw', 'compressed')
-
 
 class Picture(Protocol):
     """What a camera gives."""

@@ -5,6 +5,7 @@ from array import array
 import cv2
 import numpy as np
 import pytest
+from image_message import to_message
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
@@ -13,7 +14,6 @@ from fisheye_bridge.images import (
     from_jpeg,
     to_array,
     to_jpeg,
-    to_message,
 )
 from fisheye_geometry.encodings import CHANNELS, converted
 from fisheye_geometry.errors import ImageFormatError

@@ -81,11 +81,6 @@ class Estimate:
     free: tuple[str, ...] = ()
 
     @property
-    def intrinsics(self) -> np.ndarray:
-        """(8,) in the order of `INTRINSICS`."""
-        return self.unknowns[: len(INTRINSICS)]
-
-    @property
     def bulge_mm(self) -> np.ndarray:
         """(3,) as `bend` takes it."""
         return self.unknowns[len(INTRINSICS) :]

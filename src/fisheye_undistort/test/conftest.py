@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rendered_view import render_view, scattered_poses
 
 from fisheye_geometry.lens import FisheyeLens
 from fisheye_undistort.lens_fit import View
-from fisheye_undistort.rendered_view import render_view, scattered_poses
 from fisheye_undistort.target import STANDARD
 
 DATA = Path(os.environ.get('FISHEYE_DATA', ''))

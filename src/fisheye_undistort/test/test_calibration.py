@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import pytest
 from conftest import fisheye, seen_exactly
+from rendered_view import facing_pose, render_view, scattered_poses
 
 from fisheye_geometry.errors import CalibrationError
 from fisheye_geometry.surface import surface_for
@@ -12,7 +13,6 @@ from fisheye_undistort.circle_bias import center_bias
 from fisheye_undistort.detection import Detector
 from fisheye_undistort.lens_fit import Estimate, View
 from fisheye_undistort.pictures import read_pictures
-from fisheye_undistort.rendered_view import facing_pose, render_view, scattered_poses
 from fisheye_undistort.sheet_model import bend
 from fisheye_undistort.target import STANDARD, Target
 

@@ -2,11 +2,11 @@ import cv2
 import numpy as np
 import pytest
 from conftest import fisheye
+from rendered_view import Look, facing_pose, render_view
 
 from fisheye_geometry.errors import ImageFormatError, SettingError
 from fisheye_undistort.circle_grid import area_limits, find_circles
 from fisheye_undistort.grid_order import order_grid
-from fisheye_undistort.rendered_view import Look, facing_pose, render_view
 from fisheye_undistort.target import STANDARD
 
 CENTER_PX = 0.02

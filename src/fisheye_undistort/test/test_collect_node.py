@@ -2,10 +2,10 @@ import threading
 
 import pytest
 import rclpy
+from image_message import to_message
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
-from fisheye_bridge.images import to_message
 from fisheye_bridge.qos import IMAGE
 from fisheye_geometry.errors import SettingError, SourceError
 from fisheye_undistort import collect_node

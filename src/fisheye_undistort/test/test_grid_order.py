@@ -3,11 +3,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import fisheye
+from rendered_view import facing_pose, scattered_poses
 
 from fisheye_geometry.errors import CalibrationError
 from fisheye_undistort.circle_grid import Circles, find_circles
 from fisheye_undistort.grid_order import order_grid
-from fisheye_undistort.rendered_view import facing_pose, scattered_poses
 from fisheye_undistort.target import STANDARD, Target
 
 NEAR_PX = 6.0

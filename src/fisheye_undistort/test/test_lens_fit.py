@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 from conftest import seen_exactly
+from rendered_view import scattered_poses
 
 from fisheye_undistort.first_guess import first_guess
 from fisheye_undistort.lens_fit import GROUPS, Estimate, View, _damp, _Problem, fit
-from fisheye_undistort.rendered_view import scattered_poses
 from fisheye_undistort.sheet_model import UNKNOWNS, bend, lens_of, project
 from fisheye_undistort.target import Target
 

@@ -3,11 +3,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import seen_exactly
+from rendered_view import facing_pose, scattered_poses
 
 from fisheye_geometry.errors import SettingError
 from fisheye_undistort.calibration import calibrate
 from fisheye_undistort.lens_fit import View
-from fisheye_undistort.rendered_view import facing_pose, scattered_poses
 from fisheye_undistort.report import Report
 from fisheye_undistort.report_plot import plot_report
 from fisheye_undistort.target import Target

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import rclpy
 from fisheye_msgs.msg import Projection
+from image_message import to_message
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -14,7 +15,7 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
 from fisheye_bridge.camera_info import camera_info_of
-from fisheye_bridge.images import to_array, to_message
+from fisheye_bridge.images import to_array
 from fisheye_bridge.projection import surface_of
 from fisheye_bridge.qos import IMAGE, LATCHED
 from fisheye_geometry.camera_file import Camera

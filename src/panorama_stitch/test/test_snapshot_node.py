@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 import rclpy
 from fisheye_msgs.msg import Projection
+from image_message import to_message
 from rclpy.executors import SingleThreadedExecutor
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from fisheye_bridge import shared_memory
-from fisheye_bridge.images import to_message
 from fisheye_bridge.projection import projection_of
 from fisheye_bridge.qos import IMAGE, LATCHED
 from fisheye_bridge.stamps import stamp_of
