@@ -43,8 +43,9 @@ class SurfaceSettings:
         'raw', 'How pictures of topics are taken: raw, or as JPEG.', choices=('raw', 'compressed')
     )
 
-    def surface_of(self, lens: Lens, width: int = 0, height: int = 0) -> Surface:
+    def surface_of(self, lens: Lens) -> Surface:
         """Give the surface on which a camera's pictures are corrected."""
+        width, height = self._size
         return surface_for(
             lens,
             self.surface,
@@ -54,6 +55,11 @@ class SurfaceSettings:
             width=width,
             height=height,
         )
+
+    @property
+    def _size(self) -> tuple[int, int]:
+        """Width and height that are asked for, px; 0: from the scale."""
+        return 0, 0
 
 
 @dataclass(frozen=True)
@@ -75,6 +81,6 @@ class UndistortSettings(SurfaceSettings):
         live=True,
     )
 
-    def surface_of(self, lens: Lens) -> Surface:
-        """Give the surface on which the camera's pictures are corrected."""
-        return super().surface_of(lens, self.width, self.height)
+    @property
+    def _size(self) -> tuple[int, int]:
+        return self.width, self.height
