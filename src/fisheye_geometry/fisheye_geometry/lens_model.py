@@ -22,8 +22,29 @@ _LARGEST = 1e6
 class Lens(ABC):
     """A calibrated camera: picture size, camera matrix, distortion, and how far it sees.
 
-    `visible_angle_rad` is the radius of the image circle where it is known; the lens's own
-    `max_angle_rad` never exceeds it.
+    Attributes
+    ----------
+    width, height
+        Size of the picture, px.
+    focal_x_px, focal_y_px
+        Pixels per unit of the normalized picture: of a fisheye lens pixels per radian at the axis.
+    center_x_px, center_y_px
+        Principal point, px.
+    distortion
+        The model's coefficients, in the order that ROS gives them; without unit.
+    skew_px
+        Pixels to the right for each unit down of the normalized picture.
+    visible_angle_rad
+        Radius of the image circle where it is known; `max_angle_rad` never exceeds it.
+    model
+        `distortion_model` in a camera_info.
+    coefficient_counts
+        How many coefficients the model may have.
+
+    Raises
+    ------
+    CalibrationError
+        If the numbers describe no possible lens.
     """
 
     width: int

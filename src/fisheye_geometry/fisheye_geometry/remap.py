@@ -91,6 +91,24 @@ class RemapTable:
         interpolation: str = 'linear',
         turn: Turn = LEVEL,
     ):
+        """Compute the maps.
+
+        Parameters
+        ----------
+        source
+            What the picture shows: the camera's lens, or the surface that it is on already.
+        surface
+            What the corrected picture is to show.
+        interpolation
+            One of `INTERPOLATIONS`.
+        turn
+            Attitude of the source in the frame of the surface.
+
+        Raises
+        ------
+        GeometryError
+            For an interpolation that is not known.
+        """
         if interpolation not in _INTERPOLATIONS:
             raise GeometryError(
                 f"interpolation '{interpolation}' is not known; "
@@ -165,7 +183,23 @@ def remap_table(
     interpolation: str = 'linear',
     turn: Turn = LEVEL,
 ) -> RemapTable:
-    """Build a `RemapTable`, or give the one that was built from the same arguments."""
+    """Build a `RemapTable`, or give the one that was built from the same arguments.
+
+    Parameters
+    ----------
+    source, surface, interpolation, turn
+        As `RemapTable` takes them.
+
+    Returns
+    -------
+    RemapTable
+        Shared with all who asked for the same; the last 16 are kept.
+
+    Raises
+    ------
+    GeometryError
+        For an interpolation that is not known.
+    """
     return RemapTable(source, surface, interpolation, turn)
 
 

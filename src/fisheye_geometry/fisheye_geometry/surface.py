@@ -81,6 +81,11 @@ class Surface:
         Pixels per radian along x (on a rectilinear surface: pixels).
     center_x_px, center_y_px
         The pixel that looks along the axis; it may lie outside the picture.
+
+    Raises
+    ------
+    GeometryError
+        For a kind that is not known, and for a size or numbers with which no picture can be made.
     """
 
     kind: str

@@ -48,24 +48,24 @@ def curves(points_mm: np.ndarray) -> np.ndarray:
     return np.stack([x * x, x * y, y * y], axis=-1)
 
 
-def project(unknowns: np.ndarray, points: np.ndarray):
+def project(unknowns: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Project points as `FisheyeLens` does, with derivatives and without an end of the field.
 
     Parameters
     ----------
     unknowns
-        (8,) or more, in the order of `UNKNOWNS`.
+        (8,) or more float64, in the order of `UNKNOWNS`: four in px, four without unit.
     points
-        (N, 3) in the camera's frame.
+        (N, 3) float64 in the camera's optical frame, mm.
 
     Returns
     -------
     pixels : ndarray
-        (N, 2) px.
+        (N, 2) float64, px.
     by_intrinsics : ndarray
-        (N, 2, 8) derivatives.
+        (N, 2, 8) float64 derivatives of the pixels, px by the unit of each unknown.
     by_point : ndarray
-        (N, 2, 3) derivatives.
+        (N, 2, 3) float64 derivatives of the pixels, px/mm.
     """
     x, y, z = points.T
     focal, center = unknowns[:2], unknowns[2:4]

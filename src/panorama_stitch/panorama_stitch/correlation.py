@@ -95,10 +95,22 @@ def correlate(facing: Facing, x: Sequence[int], y: Sequence[int]) -> Landscape:
     return Landscape(columns, rows, less_chance(both / np.maximum(energy, 1.0), energy))
 
 
-def less_chance(correlation, energy):
+def less_chance(correlation: np.ndarray | float, energy: np.ndarray | float) -> np.ndarray | float:
     """Lower a correlation by what chance may give to so little structure.
 
     The variance of a structure is about 1 where there is any, so that its energy counts pixels.
+
+    Parameters
+    ----------
+    correlation
+        Of two structures, -1 to 1; one number, or an array of any shape.
+    energy
+        Sum of the squared structure where both are seen, of the same shape.
+
+    Returns
+    -------
+    ndarray or float
+        Of that shape; below the correlation, the more so the less structure there is.
     """
     return correlation - _DOUBT / np.sqrt(np.maximum(energy, 1.0))
 
