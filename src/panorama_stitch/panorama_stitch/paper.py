@@ -64,8 +64,18 @@ def offset_x(left_width: int, left: Particle, right: Particle) -> float:
     return float(remaining + int((left.center_x + right.center_x) / 2))
 
 
-def find_match(left: np.ndarray, right: np.ndarray, *, classes, opening, erosions):
-    """Run the published procedure on two grey frames: both sides' particles and their match."""
+def find_match(
+    left: np.ndarray, right: np.ndarray, *, classes: int, opening: int, erosions: int
+) -> tuple[tuple[Particle, ...], tuple[Particle, ...], ParticleMatch | None]:
+    """Run the published procedure: give both sides' particles, and the matched pair if any.
+
+    Parameters
+    ----------
+    left, right
+        Grey frames (height, width) uint8.
+    classes, opening, erosions
+        As in `paper_particles`.
+    """
     sides = [
         paper_particles(half, classes=classes, opening=opening, erosions=erosions)
         for half in facing_halves(left, right)

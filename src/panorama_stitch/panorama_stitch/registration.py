@@ -114,6 +114,11 @@ def register(
         Where to look.
     by_particles
         Whether particles propose the offsets, and the full search only where none of theirs holds.
+
+    Returns
+    -------
+    Registration
+        Its pose and rival are in px of the right half in the left half.
     """
     left, right = facing_halves(left, right)
     level_y_px = surface_left.center_y_px - surface_right.center_y_px
