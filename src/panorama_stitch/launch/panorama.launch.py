@@ -3,16 +3,18 @@
 Across a link the same file starts both halves: `robot:=true` the captures, `base:=true` the rest.
 """
 
-from math import cos, degrees, radians, sin
+import os
+import sys
+from contextlib import suppress
+from math import cos, degrees, isfinite, radians, sin
 from pathlib import Path
 
 import yaml
 from ament_index_python.packages import get_package_share_directory
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironmentVariable
-from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node, SetParameter
 
-from launch import LaunchDescription
+from launch import LaunchDescription, logging
 
 CONFIG = Path(get_package_share_directory('panorama_stitch')) / 'config'
 CAMERAS = ('left', 'right')
@@ -35,67 +37,114 @@ ARGUMENTS = {
     'use_sim_time': ('false', 'go by /clock, as a recording that is played gives it'),
 }
 
+FLAGS = tuple(name for name, (value, _) in ARGUMENTS.items() if value == 'false')
+OF_LAUNCH = ('launch-prefix', 'launch-prefix-filter', 'emulate_tty', 'ros_namespace')
+"""What launch itself and launch_ros take beside a file's own arguments."""
+PROFILES = 'FASTRTPS_DEFAULT_PROFILES_FILE'
 
-def nodes(context):
-    """Say which nodes to start; an argument that was not given leaves the parameter alone."""
-    arguments = dict(context.launch_configurations)
-    robot, base, composed = (arguments[name] == 'true' for name in ('robot', 'base', 'composed'))
-    if base and composed:
-        arguments.update({f'{camera}_source': 'topic' for camera in CAMERAS})
 
-    def parameters(**names):
-        given = {name: arguments[argument] for name, argument in names.items()}
-        return [arguments['params_file'], {name: text for name, text in given.items() if text}]
+def start(context):
+    """Say what to start."""
+    check_names(context.argv)
+    arguments = checked(context.launch_configurations)
+    return [SetParameter('use_sim_time', arguments['use_sim_time']), *nodes(arguments)]
 
-    def node(package, executable, name, namespace='', **names):
-        return Node(
-            package=package,
-            executable=executable,
-            name=name,
-            namespace=namespace,
-            parameters=parameters(**names),
-            output='screen',
-        )
 
-    extras = []
-    if arguments['view'] == 'true':
-        extras.append(node('panorama_stitch', 'viewer_node', 'viewer', host='host'))
-    if arguments['transforms'] == 'true':
-        extras += transforms(arguments)
-    captures = [
+def check_names(words):
+    """Refuse arguments of the command line that nobody knows."""
+    if not any(Path(word).name == Path(__file__).name for word in sys.argv):
+        return  # another file includes this one, and may have arguments of its own
+    for name in (word.partition(':=')[0] for word in words):
+        if name not in (*ARGUMENTS, *OF_LAUNCH):
+            raise RuntimeError(f"there is no argument '{name}'; expected {', '.join(ARGUMENTS)}")
+
+
+def checked(arguments):
+    """Give the arguments, those that are true or false as bool."""
+    flags = {}
+    for name in FLAGS:
+        flags[name] = {'true': True, 'false': False}.get(arguments[name].lower())
+        if flags[name] is None:
+            raise RuntimeError(f"{name} is '{arguments[name]}'; expected true or false")
+    paths = {name: os.path.expanduser(arguments[name]) for name in ('params_file', 'overlap_file')}
+    if not Path(paths['params_file']).is_file():
+        raise RuntimeError(f"params_file is '{paths['params_file']}', which is no file")
+    return {**arguments, **flags, **paths}
+
+
+def nodes(arguments):
+    """Say which nodes to start."""
+    robot, base = arguments['robot'], arguments['base']
+    started = []
+    if robot or not (base or arguments['composed']):
+        started += captures(arguments)
+    if base or not robot:
+        started += (composed if arguments['composed'] else separate)(arguments)
+        if arguments['view']:
+            started.append(node(arguments, 'panorama_stitch', 'viewer', host=arguments['host']))
+        if arguments['transforms']:
+            started += transforms(arguments)
+    return started
+
+
+def node(arguments, package, name, namespace='', **parameters):
+    """Start one node; what was not given leaves its parameter alone."""
+    given = {parameter: text for parameter, text in parameters.items() if text}
+    return Node(
+        package=package,
+        executable=f'{name}_node',
+        name=name,
+        namespace=namespace,
+        parameters=[arguments['params_file'], given],
+        output='screen',
+    )
+
+
+def captures(arguments):
+    """Give the nodes that read the cameras."""
+    return [
         node(
+            arguments,
             'fisheye_capture',
-            'capture_node',
             'capture',
             camera,
-            source=f'{camera}_source',
-            camera_info_url=f'{camera}_camera_info_url',
-            frame_rate_hz='frame_rate_hz',
+            source=arguments[f'{camera}_source'],
+            camera_info_url=arguments[f'{camera}_camera_info_url'],
+            frame_rate_hz=arguments['frame_rate_hz'],
         )
         for camera in CAMERAS
     ]
-    if composed:
-        own = {
-            f'{camera}.{name}': f'{camera}_{name}'
-            for camera in CAMERAS
-            for name in ('source', 'camera_info_url')
-        }
-        shared = {name: name for name in ('frame_rate_hz', 'overlap_file', 'transport')}
-        rest = [node('panorama_stitch', 'panorama_node', 'panorama', **own, **shared)]
-    else:
-        rest = [
-            node('fisheye_undistort', 'undistort_node', 'undistort', camera, transport='transport')
-            for camera in CAMERAS
-        ]
-        rest.append(node('panorama_stitch', 'stitch_node', 'stitch', overlap_file='overlap_file'))
-    has_captures = robot or not (base or composed)
-    has_rest = base or not robot
-    return (captures if has_captures else []) + (rest + extras if has_rest else [])
+
+
+def separate(arguments):
+    """Give the nodes that make the panorama of what the captures publish."""
+    transport, overlap_file = arguments['transport'], arguments['overlap_file']
+    corrections = [
+        node(arguments, 'fisheye_undistort', 'undistort', camera, transport=transport)
+        for camera in CAMERAS
+    ]
+    return [*corrections, node(arguments, 'panorama_stitch', 'stitch', overlap_file=overlap_file)]
+
+
+def composed(arguments):
+    """Give the node that does all; at the base of a link it takes the captures' topics."""
+    own = {
+        f'{camera}.{name}': arguments[f'{camera}_{name}']
+        for camera in CAMERAS
+        for name in ('source', 'camera_info_url')
+    }
+    if arguments['base']:
+        own.update({f'{camera}.source': 'topic' for camera in CAMERAS})
+    shared = {name: arguments[name] for name in ('frame_rate_hz', 'overlap_file', 'transport')}
+    return [node(arguments, 'panorama_stitch', 'panorama', **own, **shared)]
 
 
 def transforms(arguments):
     """Turn the optical frames of the cameras away from the panorama's, by half the angle each."""
-    yaw_rad = radians(float(arguments['yaw_deg'] or measured_yaw_deg(arguments['overlap_file'])))
+    yaw_deg = angle_between_cameras_deg(arguments['yaw_deg'], arguments['overlap_file'])
+    if yaw_deg is None:
+        return []
+    yaw_rad = radians(yaw_deg)
     return [
         Node(
             package='tf2_ros',
@@ -113,16 +162,36 @@ def transforms(arguments):
     ]  # fmt: skip
 
 
+def angle_between_cameras_deg(given, path):
+    """Give the angle as it was given or else measured, deg; None if it is not measured yet."""
+    if given:
+        with suppress(ValueError):
+            if isfinite(yaw_deg := float(given)):
+                return yaw_deg
+        raise RuntimeError(f"yaw_deg is '{given}'; expected a number")
+    if not path:
+        raise RuntimeError('transforms:=true needs yaw_deg or overlap_file')
+    if Path(path).exists():
+        return measured_yaw_deg(path)
+    logging.get_logger('panorama').warning(
+        f'the transforms are left out: {path} is not there yet, and yaw_deg is not given'
+    )
+    return None
+
+
 def measured_yaw_deg(path):
     """Give the angle between the two axes that was measured and saved, deg."""
-    if not Path(path).is_file():
-        raise RuntimeError(f"transforms:=true needs yaw_deg or overlap_file; '{path}' is no file")
-    saved = yaml.safe_load(Path(path).read_text())
-    (left, right), (overlap,) = saved['cameras'], saved['overlaps']
-    if not overlap['found'] or left['surface'] == 'rectilinear':
+    try:
+        saved = yaml.safe_load(Path(path).read_text())
+        (left, right), (overlap,) = saved['cameras'], saved['overlaps']
+        is_angle = overlap['found'] and left['surface'] != 'rectilinear'
+        apart_px = overlap['offset_x_px'] + right['center_x_px'] - left['center_x_px']
+        yaw_deg = degrees(apart_px / left['focal_px'])
+    except (KeyError, TypeError, ValueError, ArithmeticError, yaml.YAMLError) as error:
+        raise RuntimeError(f'{path} is not the overlap file of two cameras') from error
+    if not is_angle:
         raise RuntimeError(f'{path} holds no angle between the cameras; give yaw_deg')
-    apart_px = overlap['offset_x_px'] + right['center_x_px'] - left['center_x_px']
-    return degrees(apart_px / left['focal_px'])
+    return yaw_deg
 
 
 def generate_launch_description():
@@ -133,8 +202,9 @@ def generate_launch_description():
                 DeclareLaunchArgument(name, default_value=value, description=text)
                 for name, (value, text) in ARGUMENTS.items()
             ),
-            SetEnvironmentVariable('FASTRTPS_DEFAULT_PROFILES_FILE', str(CONFIG / 'fastdds.xml')),
-            SetParameter('use_sim_time', LaunchConfiguration('use_sim_time')),
-            OpaqueFunction(function=nodes),
+            SetEnvironmentVariable(
+                PROFILES, os.environ.get(PROFILES, str(CONFIG / 'fastdds.xml'))
+            ),
+            OpaqueFunction(function=start),
         ]
     )

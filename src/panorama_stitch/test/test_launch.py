@@ -1,0 +1,201 @@
+"""Which nodes the launch file starts, with which parameters; without launch, and with it."""
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+
+import pytest
+import yaml
+
+FILE = Path(__file__).parents[1] / 'launch' / 'panorama.launch.py'
+CAPTURES = {'left/capture', 'right/capture'}
+REST = {'left/undistort', 'right/undistort', 'stitch'}
+TOPICS = {'left.source': 'topic', 'right.source': 'topic'}
+OVERLAP = {
+    'cameras': [
+        {'surface': 'cylindrical', 'focal_px': 200.0, 'center_x_px': 300.0},
+        {'surface': 'cylindrical', 'focal_px': 200.0, 'center_x_px': 310.0},
+    ],
+    'overlaps': [{'found': True, 'offset_x_px': 390.0}],
+}
+"""Its angle is 2 rad."""
+
+
+def loaded():
+    spec = importlib.util.spec_from_file_location('panorama_launch', FILE)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+class Rig:
+    """The launch file with stubs in the place of launch."""
+
+    def __init__(self, monkeypatch):
+        self.warnings = []
+        logger = SimpleNamespace(warning=self.warnings.append)
+        stubs = {
+            'launch': {
+                'LaunchDescription': list,
+                'logging': SimpleNamespace(get_logger=lambda _: logger),
+            },
+            'launch.actions': {
+                'DeclareLaunchArgument': lambda name, **_: name,
+                'OpaqueFunction': dict,
+                'SetEnvironmentVariable': lambda *words: words,
+            },
+            'launch_ros': {},
+            'launch_ros.actions': {'Node': SimpleNamespace, 'SetParameter': lambda *words: words},
+        }
+        for name, content in stubs.items():
+            module = ModuleType(name)
+            vars(module).update(content)
+            monkeypatch.setitem(sys.modules, name, module)
+        self.file = loaded()
+
+    def start(self, **given):
+        """Give the nodes by name and the value of use_sim_time."""
+        values = {name: value for name, (value, _) in self.file.ARGUMENTS.items()}
+        words = [f'{name}:={value}' for name, value in given.items()]
+        context = SimpleNamespace(argv=words, launch_configurations={**values, **given})
+        (_, sim_time), *nodes = self.file.start(context)
+        return {f'{vars(n).get("namespace", "")}/{n.name}'.strip('/'): n for n in nodes}, sim_time
+
+    def given(self, node):
+        """Give the parameters of a node beside its file."""
+        return node.parameters[1]
+
+
+@pytest.fixture
+def rig(monkeypatch):
+    monkeypatch.setattr(sys, 'argv', ['ros2', 'launch', 'panorama_stitch', FILE.name])
+    return Rig(monkeypatch)
+
+
+@pytest.fixture
+def overlap_file(tmp_path):
+    path = tmp_path / 'overlap.yaml'
+    path.write_text(yaml.safe_dump(OVERLAP))
+    return path
+
+
+@pytest.mark.parametrize(
+    ('given', 'expected'),
+    [
+        ('', CAPTURES | REST),
+        ('composed', {'panorama'}),
+        ('robot', CAPTURES),
+        ('base', REST),
+        ('base composed', {'panorama'}),
+        ('robot base', CAPTURES | REST),
+        ('robot base composed', CAPTURES | {'panorama'}),
+        ('view', CAPTURES | REST | {'viewer'}),
+        ('robot view', CAPTURES),
+    ],
+)
+def test_which_nodes(rig, given, expected):
+    nodes, _ = rig.start(**dict.fromkeys(given.split(), 'True'))
+    assert set(nodes) == expected
+
+
+def test_what_is_given_reaches_the_nodes_that_it_concerns(rig):
+    nodes, sim_time = rig.start(left_source='0', frame_rate_hz='15', use_sim_time='TRUE')
+    assert rig.given(nodes['left/capture']) == {'source': '0', 'frame_rate_hz': '15'}
+    assert rig.given(nodes['right/capture']) == {'frame_rate_hz': '15'}
+    assert rig.given(nodes['stitch']) == {}
+    assert sim_time is True
+    assert nodes['left/capture'].package == 'fisheye_capture'
+    assert nodes['left/capture'].executable == 'capture_node'
+
+
+def test_only_the_panorama_node_takes_topics(rig):
+    given = dict(base='true', composed='true', left_source='0')
+    alone, _ = rig.start(**given)
+    nodes, _ = rig.start(**given, robot='true')
+    assert rig.given(nodes['panorama']) == rig.given(alone['panorama']) == TOPICS
+    assert rig.given(nodes['left/capture']) == {'source': '0'}
+
+
+def test_the_file_of_parameters_must_be_there(rig, tmp_path):
+    path = tmp_path / 'rig.yaml'
+    with pytest.raises(RuntimeError, match=r"params_file is '.*rig.yaml', which is no file"):
+        rig.start(params_file=str(path))
+    path.touch()
+    nodes, _ = rig.start(params_file=str(path))
+    assert {node.parameters[0] for node in nodes.values()} == {str(path)}
+
+
+def test_files_in_the_home(rig, tmp_path, monkeypatch):
+    monkeypatch.setenv('HOME', str(tmp_path))
+    nodes, _ = rig.start(overlap_file='~/overlap.yaml')
+    assert rig.given(nodes['stitch']) == {'overlap_file': f'{tmp_path}/overlap.yaml'}
+
+
+@pytest.mark.parametrize(
+    ('given', 'words'),
+    [
+        ({'composed': 'yes'}, "composed is 'yes'; expected true or false"),
+        ({'use_sim_time': '1'}, "use_sim_time is '1'; expected true or false"),
+        ({'vfov_deg': '60'}, "no argument 'vfov_deg'; expected composed, robot, "),
+        ({'transforms': 'true'}, 'needs yaw_deg or overlap_file'),
+        ({'transforms': 'true', 'yaw_deg': 'abc'}, "yaw_deg is 'abc'; expected a number"),
+        ({'transforms': 'true', 'yaw_deg': 'nan'}, "yaw_deg is 'nan'; expected a number"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(rig, given, words):
+    with pytest.raises(RuntimeError, match=words):
+        rig.start(**given)
+
+
+def test_a_file_that_includes_this_one_has_arguments_of_its_own(rig, monkeypatch):
+    monkeypatch.setattr(sys, 'argv', ['ros2', 'launch', 'robot', 'bringup.launch.py'])
+    assert set(rig.start(robot_name='x', robot='true')[0]) == CAPTURES
+
+
+def test_transforms_of_a_given_and_of_a_measured_angle(rig, overlap_file):
+    transforms = {'left_transform', 'right_transform'}
+    measured, _ = rig.start(transforms='true', overlap_file=str(overlap_file))
+    given, _ = rig.start(transforms='true', yaw_deg='114.591559026')
+    assert set(measured) == set(given) == CAPTURES | REST | transforms
+    for name in transforms:
+        assert measured[name].arguments == given[name].arguments
+    assert given['left_transform'].arguments[-3] == '-0.479425539'
+
+
+def test_transforms_wait_for_a_file_that_is_not_there_yet(rig, tmp_path):
+    nodes, _ = rig.start(transforms='true', overlap_file=str(tmp_path / 'later.yaml'))
+    assert set(nodes) == CAPTURES | REST
+    (warning,) = rig.warnings
+    assert 'later.yaml is not there yet' in warning
+
+
+@pytest.mark.parametrize('content', ['', 'image_width: 640', 'cameras: [a]\noverlaps: 3', '{['])
+def test_a_foreign_file_is_a_sentence(rig, overlap_file, content):
+    overlap_file.write_text(content)
+    with pytest.raises(RuntimeError, match='is not the overlap file of two cameras'):
+        rig.start(transforms='true', overlap_file=str(overlap_file))
+
+
+@pytest.mark.parametrize('chosen', ['', '/my/profile.xml'])
+def test_a_profile_that_the_user_chose_stays(rig, monkeypatch, chosen):
+    monkeypatch.delenv('FASTRTPS_DEFAULT_PROFILES_FILE', raising=False)
+    if chosen:
+        monkeypatch.setenv('FASTRTPS_DEFAULT_PROFILES_FILE', chosen)
+    (profile,) = (a[1] for a in rig.file.generate_launch_description() if type(a) is tuple)
+    assert profile == chosen or (not chosen and profile.endswith('/fastdds.xml'))
+
+
+def test_launch_itself_takes_it():
+    pytest.importorskip('launch_ros', reason='launch_ros is not installed')
+    launch = importlib.import_module('launch')
+    file = loaded()
+    context = launch.LaunchContext()
+    context.launch_configurations['left_source'] = '0'
+    started = [entity.visit(context) for entity in file.generate_launch_description().entities]
+    simulated, *nodes = started[-1]
+    simulated.visit(context)
+    for node in nodes:
+        node._perform_substitutions(context)
+    names = {node.node_name.strip('/') for node in nodes}
+    assert names == CAPTURES | REST
