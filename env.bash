@@ -7,7 +7,6 @@ if [ ! -e "$_fisheye/install/.built" ]; then
   return 1
 fi
 export RMW_IMPLEMENTATION="${RMW_IMPLEMENTATION:-rmw_fastrtps_cpp}"
-export ROS_AUTOMATIC_DISCOVERY_RANGE="${ROS_AUTOMATIC_DISCOVERY_RANGE:-LOCALHOST}"
 export ROS_LOG_DIR="${ROS_LOG_DIR:-$_fisheye/log/ros}"
 export FISHEYE_DATA="${FISHEYE_DATA:-$_fisheye/../shared/data}"  # real pictures, for tests and benchmarks
 export MPLCONFIGDIR="${MPLCONFIGDIR:-$_fisheye/.venv/matplotlib}"  # its caches, else in your home
@@ -16,6 +15,6 @@ export MPLCONFIGDIR="${MPLCONFIGDIR:-$_fisheye/.venv/matplotlib}"  # its caches,
 case $- in *u*) _fisheye_unset=-u ;; *) _fisheye_unset=+u ;; esac
 set +u
 source "$_fisheye/.venv/local_setup.bash" &&
-  source "$_fisheye/install/setup.bash"  # also names config/fastdds.xml, unless you named another profile
+  source "$_fisheye/install/setup.bash"  # also names config/fastdds.xml and keeps discovery on this machine
 set $_fisheye_unset
 unset _fisheye _fisheye_unset

@@ -70,6 +70,12 @@ def test_environment_keeps_what_the_user_chose():
     assert {f'{name}={value}' for name, value in chosen.items()} <= set(lines)
 
 
+def test_what_is_installed_stays_on_this_machine():
+    printed = shell('source install/setup.bash; env').stdout
+    assert 'ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST' in printed
+    assert 'fastdds.xml' in printed
+
+
 def test_environment_says_that_nothing_is_built(tmp_path):
     (tmp_path / 'env.bash').write_text((ROOT / 'env.bash').read_text())
     result = shell('source ./env.bash', tmp_path)

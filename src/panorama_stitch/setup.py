@@ -15,7 +15,7 @@ setup(
         (f'share/{package_name}/launch', glob('launch/*.launch.py')),
         (f'share/{package_name}/rviz', glob('rviz/*.rviz')),
         (f'share/{package_name}/foxglove', glob('foxglove/*.json')),
-        (f'share/{package_name}/hook', ['hook/fastdds.dsv']),
+        (f'share/{package_name}/hook', ['hook/middleware.dsv']),
         # The rig's files stay at the top of the checkout, where a user looks for them.
         (f'share/{package_name}/config', glob('../../config/*.yaml') + glob('../../config/*.xml')),
         (f'share/{package_name}/config/calibration', glob('../../config/calibration/*.yaml')),
