@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from difflib import get_close_matches
 from typing import Any
 
 from rcl_interfaces.msg import (
@@ -10,10 +11,9 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
-from rclpy.exceptions import InvalidParameterValueException
 from rclpy.node import Node
 
-from fisheye_geometry.errors import FisheyeError, SettingError
+from fisheye_geometry.errors import FisheyeError
 from fisheye_geometry.settings import Rule, convert, describe_range, rules
 
 
@@ -64,11 +64,11 @@ class Parameters:
             default = defaults.get(name, default)
             start = list(default) if isinstance(default, tuple) else default
             full_name = prefix + name
-            try:
-                parameter = node.declare_parameter(full_name, start, _descriptor(rule, kind))
-            except InvalidParameterValueException as error:
-                raise SettingError(str(error)) from error
+            anything = ParameterDescriptor(dynamic_typing=True)
+            parameter = node.declare_parameter(full_name, start, anything)
             values[name] = convert(full_name, parameter.value, kind, rule)
+            # Only now, because rclpy would refuse what is out of range in its own words.
+            node.set_descriptor(full_name, _descriptor(rule, kind))
         self.settings = settings(**values)
         node.add_on_set_parameters_callback(self._set)
 
@@ -89,6 +89,19 @@ class Parameters:
         except FisheyeError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
+
+
+def misspelt(node: Node) -> str:
+    """Say which parameters a node was given that it does not have, '' if there are none."""
+    declared = list(node.get_parameters_by_prefix(''))
+    complaints = []
+    # rclpy keeps what was given to itself.
+    for name in node._parameter_overrides:
+        if name not in declared and not name.startswith('qos_overrides.'):
+            of_cameras = [other for other in declared if other.endswith(f'.{name}')]
+            near = of_cameras or get_close_matches(name, declared, n=1)
+            complaints.append(name + (f' (is {" or ".join(near)} meant?)' if near else ''))
+    return f'there is no parameter {", ".join(complaints)}' if complaints else ''
 
 
 def _descriptor(rule: Rule, kind: type) -> ParameterDescriptor:

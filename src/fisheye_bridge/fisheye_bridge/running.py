@@ -17,6 +17,8 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from fisheye_bridge import shared_memory
+from fisheye_bridge.command_line import refuse_words, usage
+from fisheye_bridge.parameters import misspelt
 from fisheye_geometry.errors import FisheyeError
 
 _Node = TypeVar('_Node', bound=Node)
@@ -40,6 +42,9 @@ def run(node_class: type[Node]) -> int:
     int
         The exit code: 0, or 1 if the node could not start.
     """
+    if text := usage(node_class):
+        print(text)
+        return 0
     node = executor = None
     threading.excepthook = _give_up
     ended = threading.Event()
@@ -57,8 +62,11 @@ def run(node_class: type[Node]) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, end)
     try:
+        refuse_words()
         _init(node_class)
         node = node_class()
+        if complaint := misspelt(node):
+            node.get_logger().warning(complaint)
         executor = SingleThreadedExecutor()
         executor.add_node(node)
         while not ended.is_set():
