@@ -18,7 +18,7 @@ from fisheye_geometry.surface import Surface
 
 _OVERSAMPLING = 2.0
 """Resolution of the painted town in units of the view's."""
-_WIDEST_CANVAS_PX = 8192
+_NARROWEST_CANVAS_PX, _WIDEST_CANVAS_PX = 64, 8192
 _BLUR_PX = 0.5
 """Softness of the picture in pixels of the view, so that resampling it loses little."""
 _BAND_ROWS = 64
@@ -102,7 +102,8 @@ def _soft_town(seed: int, px_per_rad: float) -> tuple[Surface, np.ndarray]:
 
     The last one is kept: the cameras of a rig mostly need the same.
     """
-    width = min(2 * round(np.pi * px_per_rad * _OVERSAMPLING), _WIDEST_CANVAS_PX)
+    wanted = 2 * round(np.pi * px_per_rad * _OVERSAMPLING)
+    width = min(max(wanted, _NARROWEST_CANVAS_PX), _WIDEST_CANVAS_PX)
     canvas = paint_town(width, seed)
     around = canvas.surface
     margin = 16

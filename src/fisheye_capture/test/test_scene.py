@@ -122,3 +122,8 @@ def test_the_field_of_view_spans_the_picture(fov_deg):
     assert isinstance(lens, FisheyeLens)
     edges = [lens.angle_at(x, lens.center_y_px) for x in (-0.5, 799.5)]
     assert np.degrees(edges) == pytest.approx([fov_deg / 2, fov_deg / 2])
+
+
+@pytest.mark.parametrize('size', [(1, 1), (1, 100), (3, 1)])
+def test_the_smallest_picture_is_drawn(size):
+    assert Scene().view(lens_of(*size)).frame(0).shape == (*size[::-1], 3)

@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from math import inf
 from pathlib import Path
 
 from fisheye_msgs.msg import Projection
@@ -52,6 +53,13 @@ class SnapshotNode(Node):
         return self.taken
 
 
+def seconds(text: str) -> float:
+    """Read a time of the command line."""
+    if not 0 <= (value := float(text)) < inf:
+        raise argparse.ArgumentTypeError(f'{text} is no time; expected seconds from 0')
+    return value
+
+
 def parse() -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(prog='snapshot', description='Save one panorama.')
@@ -62,9 +70,15 @@ def parse() -> argparse.Namespace:
         help='png: as it is, with its projection in a JSON file beside it; '
         'gpano: equirectangular JPEG that viewers of photo spheres read',
     )
-    parser.add_argument('--out', type=Path, default=Path('panorama'), help='the file to write')
-    parser.add_argument('--timeout', type=float, default=10.0, help='how long to wait, s')
-    return parser.parse_args(remove_ros_args(sys.argv)[1:])
+    parser.add_argument(
+        '--out', type=Path, default=Path('panorama'), help='the file to write, or its folder'
+    )
+    parser.add_argument('--timeout', type=seconds, default=10.0, help='how long to wait, s')
+    try:
+        words = remove_ros_args(sys.argv)[1:]
+    except RuntimeError as error:
+        parser.error(str(error))
+    return parser.parse_args(words)
 
 
 def main() -> int:

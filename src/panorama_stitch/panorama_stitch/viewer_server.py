@@ -86,7 +86,8 @@ class ViewerServer:
         self._thread.start()
         try:
             asyncio.run_coroutine_threadsafe(self._open(), self._loop).result()
-        except OSError as error:
+        # A name that cannot even be looked up is a ValueError.
+        except (OSError, ValueError) as error:
             self.stop()
             raise SettingError(_refusal(self._settings, error)) from error
 
@@ -206,8 +207,8 @@ def _reachable(host: str) -> str:
             return socket.gethostname()
 
 
-def _refusal(settings: ViewerSettings, error: OSError) -> str:
+def _refusal(settings: ViewerSettings, error: OSError | ValueError) -> str:
     where = f'port {settings.port} of {settings.host}'
-    if error.errno == errno.EADDRINUSE:
+    if isinstance(error, OSError) and error.errno == errno.EADDRINUSE:
         return f'{where} is in use by another program; set the parameter port to a free one'
-    return f'cannot serve on {where}: {error.strerror or error}'
+    return f'cannot serve on {where}: {getattr(error, "strerror", None) or error}'

@@ -1,5 +1,7 @@
 """The node behind the command snapshot, beside a node that publishes panoramas."""
 
+import sys
+
 import numpy as np
 import pytest
 import rclpy
@@ -14,7 +16,7 @@ from fisheye_bridge.projection import projection_of
 from fisheye_bridge.qos import IMAGE, LATCHED
 from fisheye_bridge.stamps import stamp_of
 from fisheye_geometry.surface import Surface
-from panorama_stitch.snapshot_node import SnapshotNode, main
+from panorama_stitch.snapshot_node import SnapshotNode, main, parse
 
 SURFACE = Surface('cylindrical', 32, 12, 10.0, 15.5, 5.5)
 PANORAMA = np.full((12, 32, 3), (10, 20, 30), np.uint8)
@@ -60,3 +62,19 @@ def test_the_command_says_that_no_panorama_came(monkeypatch, capsys):
         capsys.readouterr().err == 'snapshot: no panorama came on /panorama/image within 0.1 s\n'
     )
     assert prepared, 'shared memory of killed nodes is cleared'
+
+
+@pytest.mark.parametrize(
+    ('words', 'said'),
+    [
+        (['--timeout', 'nan'], 'nan is no time; expected seconds from 0'),
+        (['--timeout=-1'], '-1 is no time; expected seconds from 0'),
+        (['--ros-args', '-p', 'x'], "Couldn't parse parameter override rule: '-p x'"),
+        (['--ros-args', '-r', '__ns:=bad-ns'], "Couldn't parse remap rule: '-r __ns:=bad-ns'"),
+    ],
+)
+def test_a_wrong_command_line_is_a_sentence(monkeypatch, capsys, words, said):
+    monkeypatch.setattr(sys, 'argv', ['snapshot', *words])
+    with pytest.raises(SystemExit):
+        parse()
+    assert said in capsys.readouterr().err

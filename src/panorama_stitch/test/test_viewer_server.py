@@ -305,3 +305,9 @@ def test_an_address_of_another_machine_is_a_sentence():
     server = ViewerServer(ViewerSettings(host='203.0.113.7', port=0), calibrate=None, watched=None)
     with pytest.raises(SettingError, match=r'cannot serve on port 0 of 203\.0\.113\.7'):
         server.start()
+
+
+def test_a_name_that_cannot_be_one_is_a_sentence():
+    server = ViewerServer(ViewerSettings(host='....', port=0), calibrate=None, watched=None)
+    with pytest.raises(SettingError, match=r'cannot serve on port 0 of \.\.\.\.: '):
+        server.start()
