@@ -76,6 +76,8 @@ def _target(options: argparse.Namespace) -> Target:
 
 
 def _run(options: argparse.Namespace) -> int:
+    if not options.name or '/' in options.name:
+        raise SettingError(f"--name is '{options.name}'; expected a word without '/'")
     target = _target(options)
     if options.print:
         from fisheye_undistort.target_sheet import write_sheet

@@ -109,6 +109,7 @@ def test_all_views_alike(shots, tmp_path, capsys):
         (['x.png', '--radius-mm', '90'], 'radius_mm is 90'),
         (['--print', 'sheet.docx'], "'sheet.docx'"),
         (['nowhere.png'], 'nowhere.png is not there'),
+        (['nowhere.png', '--name', 'a/b'], "--name is 'a/b'; expected a word without '/'"),
     ],
 )
 def test_bad_arguments_are_a_sentence_too(arguments, told, capsys):

@@ -1,5 +1,6 @@
 """The overlap file: what was measured once, kept for the next start, valid for one rig only."""
 
+import os
 from collections.abc import Sequence
 from contextlib import suppress
 from math import degrees, inf, radians
@@ -44,7 +45,7 @@ def write_overlaps(
         If the file cannot be written.
     """
     write_mapping(
-        path,
+        os.path.expanduser(path),
         {
             'version': VERSION,
             'cameras': [_camera(*camera) for camera in zip(cameras, surfaces, strict=True)],
@@ -67,6 +68,7 @@ def read_overlaps(
         If the file cannot be read, lacks something, or was measured on another rig; the sentence
         names the file and what does not fit.
     """
+    path = os.path.expanduser(path)
     with suppress(OSError):
         # What cannot even be looked at is no missing file; reading it says why.
         if not path or not Path(path).exists():

@@ -5,6 +5,7 @@ the GPano tags by which viewers of photo spheres know its place on the sphere.
 """
 
 import json
+import os
 from datetime import datetime, timezone
 from math import atan, atan2, ceil, floor, hypot, pi
 from pathlib import Path
@@ -19,6 +20,7 @@ from fisheye_geometry.surface import Surface
 FORMATS = {'png': '.png', 'gpano': '.jpg'}
 """How a panorama can be saved, and the suffix of the file."""
 
+_SUFFIXES = ('.png', '.jpg', '.jpeg')
 _JPEG_QUALITY = 95
 _XMP_NAMESPACE = b'http://ns.adobe.com/xap/1.0/\0'
 _XMP = """<?xpacket begin="\ufeff" id="W5M0MpCehiHzreSzNTczkc9d"?>
@@ -37,7 +39,8 @@ def save(path: Path, form: str, image: np.ndarray, surface: Surface, stamp_ns: i
     Parameters
     ----------
     path
-        The file; its suffix is that of the format whatever it says.
+        The file, without or with a suffix of a picture, in whose place that of the format is put;
+        or an existing folder.
     form
         One of `FORMATS`.
     image
@@ -57,7 +60,10 @@ def save(path: Path, form: str, image: np.ndarray, surface: Surface, stamp_ns: i
     SettingError
         If a file cannot be written.
     """
-    path = path.with_suffix(FORMATS[form])
+    if os.path.isdir(path):
+        path /= 'panorama'
+    name = path.stem if path.suffix.lower() in _SUFFIXES else path.name
+    path = path.with_name(name + FORMATS[form])
     if form == 'gpano':
         return [_write(path, gpano(image, surface))]
     description = {

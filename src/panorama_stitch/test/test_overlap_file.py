@@ -51,6 +51,13 @@ def test_what_was_written_is_read_again(path):
     assert second == replace(SECOND, min_correlation_value=second.min_correlation_value)
 
 
+def test_a_file_in_the_home(monkeypatch, tmp_path):
+    monkeypatch.setenv('HOME', str(tmp_path))
+    write_overlaps('~/overlap.yaml', CAMERAS[:2], SURFACES[:2], [FIRST])
+    assert (tmp_path / 'overlap.yaml').is_file()
+    assert len(read_overlaps('~/overlap.yaml', CAMERAS[:2], SURFACES[:2])) == 1
+
+
 def test_particles_are_not_kept(path):
     particle = Particle(*range(10))
     write_overlaps(

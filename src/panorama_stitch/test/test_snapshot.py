@@ -101,6 +101,23 @@ def test_a_gpano_file_is_one_jpeg(tmp_path):
     assert xmp(path.read_bytes())['UsePanoramaViewer'] == 'True'
 
 
+@pytest.mark.parametrize(
+    ('given', 'expected'),
+    [
+        ('v1.2', 'v1.2.png'),
+        ('v1.2.JPEG', 'v1.2.png'),
+        ('.', 'panorama.png'),
+        ('folder', 'folder/panorama.png'),
+    ],
+)
+def test_only_the_suffix_of_a_picture_is_replaced(tmp_path, given, expected):
+    (tmp_path / 'folder').mkdir()
+    image = np.zeros((480, 1200, 3), np.uint8)
+    picture, description = save(tmp_path / given, 'png', image, SURFACES[0], STAMP_NS)
+    assert picture == tmp_path / expected
+    assert description == picture.with_suffix('.json')
+
+
 def test_a_file_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / 'file').touch()
     with pytest.raises(SettingError, match=r'file/here\.png cannot be written'):
