@@ -17,7 +17,7 @@ demo: build ## run two synthetic cameras to a panorama (RIG=folder: the pictures
 	@$(run) python tools/demo.py $(if $(RIG),--rig '$(RIG)') $(ARGS)
 
 view: build ## the same, live in a browser
-	@$(run) python tools/demo.py --view $(if $(RIG),--rig '$(RIG)') $(ARGS)
+	@$(run) python tools/demo.py $(if $(RIG),--rig '$(RIG)') --view $(ARGS)
 
 test: build ## run every test: those of each package, then those across packages
 	@$(run) bash tools/run_tests.bash

@@ -14,7 +14,12 @@ from contact_sheet import contact_sheet, with_particles
 from rig import SIDES, Rig, camera_parameters, unused_domain, wait_for
 from watcher import Watcher
 
-from fisheye_geometry.errors import FisheyeError
+from fisheye_capture.settings import CaptureSettings
+from fisheye_capture.synthetic import synthetic_lens
+from fisheye_geometry.camera_file import read_camera
+from fisheye_geometry.errors import FisheyeError, OverlapError
+from fisheye_undistort.correction import Correction
+from fisheye_undistort.settings import UndistortSettings
 
 SYNTHETIC_OFFSET_DEG = 140.0
 START_TIMEOUT_S = 60.0
@@ -26,10 +31,12 @@ def main() -> int:
     domain = unused_domain()
     out = arguments.out
     out.mkdir(parents=True, exist_ok=True)
+    for former in (out / 'log').glob('*.log'):
+        former.unlink()
     with Rig(domain, out / 'log') as rig:
         what = arguments.rig or 'the synthetic rig'
         nodes = 'one node' if arguments.composed else 'five nodes'
-        print(f'Starting {nodes} on {what} ...', flush=True)
+        print(f'Starting {nodes} on {what} in ROS_DOMAIN_ID={domain} ...', flush=True)
         begin = time.monotonic()
         cameras = camera_parameters(arguments.rig)
         rig.start_all(arguments.composed, cameras, frame_rate_hz=arguments.rate)
@@ -37,14 +44,16 @@ def main() -> int:
             view(rig, arguments.view)
             return 0
         with Watcher(domain) as watcher:
-            demonstrate(rig, watcher, begin, arguments)
+            try:
+                demonstrate(rig, watcher, begin, arguments)
+            except (FisheyeError, TimeoutError) as error:
+                raise RuntimeError(f'{error}\n{rig.last_warnings()}') from error
     print('To look around in it, live in a browser: make view')
     return 0
 
 
 def view(rig: Rig, host: str) -> None:
     """Show the panorama in browsers until Ctrl-C."""
-    rig.log('viewer').unlink(missing_ok=True)  # a former run's address
     rig.start('viewer', host=host)
     address = wait_for(
         lambda: rig.check_alive() or re.search(r'http://\S+', rig.log('viewer').read_text()),
@@ -65,28 +74,48 @@ def demonstrate(rig: Rig, watcher: Watcher, begin: float, arguments: argparse.Na
     wait_for(lambda: rig.check_alive() or watcher.newest, START_TIMEOUT_S, 'a first panorama')
     print(f'First panorama after {time.monotonic() - begin:.1f} s.', flush=True)
     answer = watcher.calibrate()
+    if not answer.success:
+        raise OverlapError(answer.message)
     print(f'/calibrate_overlap: {answer.message}')
     watch(watcher, rig, arguments.seconds)
     report(watcher, answer, arguments)
     cv2.imwrite(str(arguments.out / 'panorama.png'), watcher.picture())
-    cv2.imwrite(str(arguments.out / 'contact_sheet.png'), sheet(watcher, answer.overlaps[0]))
+    drawn = sheet(watcher, answer.overlaps[0], arguments.rig)
+    cv2.imwrite(str(arguments.out / 'contact_sheet.png'), drawn)
     print(f'Saved panorama.png and contact_sheet.png in {arguments.out}')
 
 
-def sheet(watcher: Watcher, overlap) -> np.ndarray:
+def sheet(watcher: Watcher, overlap, folder: Path | None) -> np.ndarray:
     """Draw how the panorama came about: raw, corrected with the overlap's particles, stitched."""
-    rows = [[(f'{side}/image_raw', watcher.picture_on(f'{side}/image_raw')) for side in SIDES]]
+    raw = [watcher.picture_on(f'{side}/image_raw') for side in SIDES]
     if watcher.node.count_publishers('left/image_rect'):
         left, right = (watcher.picture_on(f'{side}/image_rect') for side in SIDES)
-        half = left.shape[1] - left.shape[1] // 2
-        particles = overlap.left_particles, overlap.right_particles
-        rows.append(
-            [
-                ('left/image_rect', with_particles(left, particles[0], overlap.left_match, half)),
-                ('right/image_rect', with_particles(right, particles[1], overlap.right_match, 0)),
-            ]
-        )
-    return contact_sheet([*rows, [('panorama/image', watcher.picture())]])
+    else:
+        left, right = (corrected(*entry, folder) for entry in zip(raw, SIDES, strict=True))
+    half = left.shape[1] - left.shape[1] // 2
+    left = with_particles(left, overlap.left_particles, overlap.left_match, half)
+    right = with_particles(right, overlap.right_particles, overlap.right_match, 0)
+    return contact_sheet(
+        [
+            [(f'{side}/image_raw', picture) for side, picture in zip(SIDES, raw, strict=True)],
+            [('left, corrected', left), ('right, corrected', right)],
+            [('panorama/image', watcher.picture())],
+        ]
+    )
+
+
+def corrected(raw: np.ndarray, side: str, folder: Path | None) -> np.ndarray:
+    """Correct a picture as one node does it, which publishes raw pictures and panoramas only."""
+    if folder:
+        lens = read_camera(folder / f'{side}.yaml').lens
+    else:
+        fov_rad = math.radians(CaptureSettings().synthetic_fov_deg)
+        lens = synthetic_lens(*raw.shape[1::-1], fov_rad)
+    correction = Correction(lens, UndistortSettings())
+    surface = correction.surface
+    picture = np.empty((surface.height, surface.width, *raw.shape[2:]), np.uint8)
+    correction(raw, picture)
+    return picture
 
 
 def parse() -> argparse.Namespace:
@@ -113,7 +142,7 @@ def parse() -> argparse.Namespace:
 
 
 def watch(watcher: Watcher, rig: Rig, seconds: float) -> None:
-    """Count panoramas for a while, with a line that shows that they come."""
+    """Count panoramas for a while, two at least, with a line that shows that they come."""
     watcher.restart()
     end = time.monotonic() + seconds
     while (left := end - time.monotonic()) > 0:
@@ -123,6 +152,9 @@ def watch(watcher: Watcher, rig: Rig, seconds: float) -> None:
             print(f'\r{len(watcher.stamps_ns)} panoramas ...', end='', flush=True)
     if sys.stdout.isatty():
         print('\r', end='')
+    wait_for(
+        lambda: rig.check_alive() or len(watcher.stamps_ns) > 1, START_TIMEOUT_S, 'two panoramas'
+    )
 
 
 def report(watcher: Watcher, answer, arguments: argparse.Namespace) -> None:

@@ -2,6 +2,7 @@
 
 import os
 import random
+import re
 import signal
 import subprocess
 import time
@@ -144,6 +145,15 @@ class Rig:
             if process.poll() is not None:
                 words = self.log(node).read_text(errors='replace').strip()[-2000:]
                 raise RuntimeError(f'{node} ended with code {process.returncode}:\n{words}')
+
+    def last_warnings(self) -> str:
+        """Give the last warning of each node that gave one, and where all are."""
+        lines = [f'The logs are in {self._log_folder}.']
+        for node in self.processes:
+            words = self.log(node).read_text(errors='replace').splitlines()
+            said = [line for line in words if re.match(r'\[(WARN|ERROR|FATAL)\]', line)]
+            lines += [f'{node}: {line}' for line in said[-1:]]
+        return '\n'.join(lines)
 
     def _wait(self, node: str) -> int:
         process = self.processes[node]
