@@ -7,15 +7,15 @@ from pathlib import Path
 
 from fisheye_msgs.msg import Projection
 from rclpy.node import Node
-from rclpy.utilities import remove_ros_args
 
+from fisheye_bridge.command_line import own_words
 from fisheye_bridge.projection import surface_of
 from fisheye_bridge.qos import LATCHED
 from fisheye_bridge.running import spin_until, started
 from fisheye_bridge.stamps import ns_of
 from fisheye_bridge.topics import ImageSubscription
 from fisheye_geometry.encodings import converted
-from fisheye_geometry.errors import FisheyeError, SourceError
+from fisheye_geometry.errors import FisheyeError, SettingError, SourceError
 from panorama_stitch.snapshot import FORMATS, save
 
 
@@ -75,10 +75,9 @@ def parse() -> argparse.Namespace:
     )
     parser.add_argument('--timeout', type=seconds, default=10.0, help='how long to wait, s')
     try:
-        words = remove_ros_args(sys.argv)[1:]
-    except RuntimeError as error:
+        return parser.parse_args(own_words())
+    except SettingError as error:
         parser.error(str(error))
-    return parser.parse_args(words)
 
 
 def main() -> int:
