@@ -14,13 +14,14 @@ from std_msgs.msg import Header
 
 from fisheye_bridge.awaiting import awaitable
 from fisheye_bridge.diagnostics import ERROR, WARN, WARNING_PAUSE_S, Diagnostics, Report, Shedding
-from fisheye_bridge.images import ImageBuffer, converted
+from fisheye_bridge.images import ImageBuffer
 from fisheye_bridge.parameters import Parameters
 from fisheye_bridge.projection import projection_of
 from fisheye_bridge.qos import LATCHED
 from fisheye_bridge.stamps import stamp_of
 from fisheye_bridge.topics import ImagePublisher
 from fisheye_capture.rate import Rate
+from fisheye_geometry.encodings import converted
 from fisheye_geometry.errors import FisheyeError, SettingError
 from panorama_stitch.compositor import Compositor
 from panorama_stitch.figures import figures

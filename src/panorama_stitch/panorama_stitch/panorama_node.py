@@ -13,6 +13,7 @@ from fisheye_bridge.topics import ImagePublisher
 from fisheye_capture.calibration_url import calibration_of
 from fisheye_capture.grabber import Grabber
 from fisheye_capture.settings import CameraSettings, CaptureSettings, FrameSettings
+from fisheye_capture.source import shown_source
 from fisheye_geometry.errors import CameraFileError, FisheyeError
 from fisheye_geometry.image_circle import SeenLens
 from fisheye_geometry.lens import Lens
@@ -94,8 +95,9 @@ class _OwnEye(_Eye):
         self._grabber = Grabber(self._settings, self._take, on_change=self._tell)
         camera = calibration_of(self._settings.camera_info_url) or self._grabber.camera
         if camera is None:
+            shown = shown_source(own.source)
             raise CameraFileError(
-                f'{name}.camera_info_url is empty; expected the calibration file of {own.source} '
+                f'{name}.camera_info_url is empty; expected the calibration file of {shown} '
                 '(calibrate_lens makes one)'
             )
         self._camera, self._seen, self._fault = camera, SeenLens(camera.lens), ''
