@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from random import Random
 
 import numpy as np
 
@@ -26,12 +27,17 @@ def spread(values) -> Spread:
 
 
 def interleaved(functions: Mapping[str, Callable[[], object]], rounds: int) -> dict:
-    """Call functions in turns; give the times of each, ms, as an array of `rounds` numbers."""
+    """Call functions in turns; give the times of each, ms, as an array of `rounds` numbers.
+
+    What runs before leaves more or less of the cache, so each round has another order.
+    """
     times = {name: np.empty(rounds) for name in functions}
+    order, random = list(functions.items()), Random(1)
     for function in functions.values():
         function()
     for i in range(rounds):
-        for name, function in functions.items():
+        random.shuffle(order)
+        for name, function in order:
             begin = time.perf_counter()
             function()
             times[name][i] = (time.perf_counter() - begin) * 1e3
