@@ -9,7 +9,7 @@ from fisheye_geometry.errors import CalibrationError
 from fisheye_undistort.circle_grid import find_circles
 from fisheye_undistort.grid_order import order_grid
 from fisheye_undistort.lens_fit import View
-from fisheye_undistort.target import MARKERS, Target
+from fisheye_undistort.target import MARKERS, Target, marker_dictionary
 
 _MIN_CORNERS = 8
 """Fewer corners of a ChArUco board hold a pose, but hardly anything about the lens."""
@@ -71,7 +71,7 @@ def _chessboard(gray: np.ndarray, target: Target):
 
 
 def _charuco(gray: np.ndarray, target: Target):
-    dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, MARKERS))
+    dictionary = marker_dictionary()
     if hasattr(cv2.aruco, 'CharucoDetector'):
         board = cv2.aruco.CharucoBoard(
             (target.columns, target.rows), target.dx_mm, target.marker_mm, dictionary

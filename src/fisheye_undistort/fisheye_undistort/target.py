@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from functools import cached_property
 
+import cv2
 import numpy as np
 
 from fisheye_geometry.errors import SettingError
@@ -141,3 +142,19 @@ STANDARD = {
     'charuco': Target('charuco', 5, 7, 35.0, 35.0, marker_mm=26.0),
 }
 """The sheet of each kind where nothing else is said."""
+
+
+def marker_dictionary():
+    """Give OpenCV's dictionary of the markers on a `charuco` sheet.
+
+    Raises
+    ------
+    SettingError
+        If this OpenCV cannot read markers.
+    """
+    if not hasattr(cv2, 'aruco'):
+        raise SettingError(
+            f'target is charuco, and OpenCV {cv2.__version__} here is built without its markers; '
+            'expected OpenCV 4.7 or later, or another target'
+        )
+    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, MARKERS))

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
 from fisheye_geometry.errors import SettingError
-from fisheye_undistort.target import MARKERS, Target
+from fisheye_undistort.target import Target, marker_dictionary
 
 FORMATS = ('.pdf', '.svg', '.png')
 
@@ -136,7 +136,7 @@ def _marker_bits(target: Target):
     """Black cells of one marker after another, (n, n) bool each; None on a chessboard."""
     if target.kind != 'charuco':
         return None
-    dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, MARKERS))
+    dictionary = marker_dictionary()
     side = dictionary.markerSize
     unpack = cv2.aruco.Dictionary_getBitsFromByteList
     return (

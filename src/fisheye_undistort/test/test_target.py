@@ -1,8 +1,9 @@
+import cv2
 import numpy as np
 import pytest
 
 from fisheye_geometry.errors import SettingError
-from fisheye_undistort.target import KINDS, STANDARD, Target
+from fisheye_undistort.target import KINDS, STANDARD, Target, marker_dictionary
 
 
 def test_every_kind_has_a_standard_sheet():
@@ -50,3 +51,9 @@ def test_impossible_targets_are_refused_by_name(arguments, told):
     with pytest.raises(SettingError) as error:
         Target(*arguments)
     assert told in str(error.value)
+
+
+def test_an_opencv_without_markers_is_said(monkeypatch):
+    monkeypatch.delattr(cv2, 'aruco')
+    with pytest.raises(SettingError, match='target is charuco, and OpenCV .* without its markers'):
+        marker_dictionary()
