@@ -55,5 +55,5 @@ def test_impossible_targets_are_refused_by_name(arguments, told):
 
 def test_an_opencv_without_markers_is_said(monkeypatch):
     monkeypatch.delattr(cv2, 'aruco')
-    with pytest.raises(SettingError, match='target is charuco, and OpenCV .* without its markers'):
+    with pytest.raises(SettingError, match='target is charuco, and OpenCV'):
         marker_dictionary()
