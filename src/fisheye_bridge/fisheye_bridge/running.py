@@ -25,7 +25,7 @@ _Node = TypeVar('_Node', bound=Node)
 
 _LONGEST_WAIT_S = 0.2
 """A signal is noticed after so long at the latest."""
-_LONGEST_END_S = 1.5
+_LONGEST_END_S = 1.2
 """What is still in work so long after it, as a calibration, is left undone."""
 
 
