@@ -69,7 +69,7 @@ class Lens(ABC):
                 )
         for name in ('focal_x_px', 'focal_y_px', 'visible_angle_rad'):
             value = getattr(self, name)
-            if not 0 < value <= _LARGEST:
+            if not 1 / _LARGEST <= value <= _LARGEST:
                 raise CalibrationError(
                     f'{name} is {value}; expected a number above 0, up to {_LARGEST:g}'
                 )

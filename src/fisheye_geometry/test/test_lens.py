@@ -125,3 +125,8 @@ def test_numbers_that_describe_no_lens_are_refused(change, words):
     }
     with pytest.raises(CalibrationError, match=words):
         make_lens(**{**good, **change})
+
+
+def test_a_focal_length_of_nearly_nothing_is_refused():
+    with pytest.raises(CalibrationError, match='focal_x_px is 1e-300; expected a number above 0'):
+        make_lens('equidistant', 640, 480, [1e-300, -1, 0, 0, 1e-300, 0, 0, 0, 1], [0, 0, 0, 0])
