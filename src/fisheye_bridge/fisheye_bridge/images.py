@@ -9,7 +9,7 @@ from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
 from fisheye_geometry.coded_picture import decoded
-from fisheye_geometry.encodings import CHANNELS, converted
+from fisheye_geometry.encodings import CHANNELS, to_opencv
 from fisheye_geometry.errors import ImageFormatError
 from fisheye_geometry.lens import MAX_PICTURE_SIDE_PX
 
@@ -130,8 +130,9 @@ def to_jpeg(image: np.ndarray, encoding: str, header: Header, quality: int) -> C
     quality
         JPEG quality, 1 to 100.
     """
-    stored = converted(image, encoding, 'mono8' if encoding == 'mono8' else 'bgr8')
-    _, coded = cv2.imencode('.jpg', stored, (cv2.IMWRITE_JPEG_QUALITY, quality))
+    _, coded = cv2.imencode(
+        '.jpg', to_opencv(image, encoding), (cv2.IMWRITE_JPEG_QUALITY, quality)
+    )
     return jpeg_message(coded, encoding, header)
 
 

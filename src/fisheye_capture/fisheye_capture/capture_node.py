@@ -19,6 +19,7 @@ from fisheye_capture.settings import CaptureSettings
 from fisheye_capture.source import Frame, JpegFrame, shown_source
 from fisheye_geometry.camera_file import Camera, read_camera, write_camera
 from fisheye_geometry.errors import CameraFileError, FisheyeError
+from fisheye_geometry.yaml_file import is_missing
 
 
 class CaptureNode(Node):
@@ -55,13 +56,9 @@ class CaptureNode(Node):
         path = self._calibration_path
         if path is None:
             return self._grabber.camera
-        try:
-            path.stat()
-        except FileNotFoundError:
+        if is_missing(path):
             self.get_logger().warning(f'{path} is not there yet; set_camera_info writes it')
             return None
-        except OSError:
-            pass  # What is wrong with it, the one who reads it says.
         return read_camera(path)
 
     def _publish(self, frame: Frame | JpegFrame) -> None:

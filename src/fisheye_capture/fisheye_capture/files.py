@@ -9,7 +9,8 @@ import numpy as np
 
 from fisheye_capture.pace import PacedSource
 from fisheye_capture.settings import CaptureSettings
-from fisheye_capture.source import SourceEndedError, encoded
+from fisheye_capture.source import SourceEndedError
+from fisheye_geometry.encodings import from_opencv
 from fisheye_geometry.errors import SourceError
 from fisheye_geometry.picture_file import read_picture
 
@@ -19,7 +20,7 @@ class PictureSource(PacedSource):
 
     def __init__(self, settings: CaptureSettings, path: Path):
         super().__init__(settings.frame_rate_hz)
-        self._image = encoded(read_picture(path), settings.encoding)
+        self._image = from_opencv(read_picture(path), settings.encoding)
         self._image.setflags(write=False)
 
     def _picture(self, stamp_ns):
@@ -46,7 +47,7 @@ class SequenceSource(PacedSource):
                 f'{name} has {image.shape[1]}x{image.shape[0]} px; '
                 f'the pictures before it have {self._shape[1]}x{self._shape[0]} px'
             )
-        return encoded(image, self._encoding)
+        return from_opencv(image, self._encoding)
 
 
 def folder_pictures(paths: Sequence[Path], loop: bool) -> Iterator[tuple[str, np.ndarray]]:

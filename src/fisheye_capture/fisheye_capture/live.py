@@ -12,9 +12,9 @@ from fisheye_capture.source import (
     Source,
     SourceEndedError,
     SourceLostError,
-    encoded,
 )
 from fisheye_geometry.coded_picture import size_of, whole_jpeg
+from fisheye_geometry.encodings import from_opencv
 from fisheye_geometry.errors import ImageFormatError, SourceError
 
 _BROKEN_IN_A_ROW = 10
@@ -65,7 +65,7 @@ class LiveSource(Source):
 
     def _frame(self, stamp_ns, image):
         """Make a frame of what OpenCV gave; None if it is broken."""
-        return Frame(stamp_ns, encoded(image, self._encoding))
+        return Frame(stamp_ns, from_opencv(image, self._encoding))
 
     def _checked(self, frame):
         """Refuse a picture of another size: the calibration holds for one only."""

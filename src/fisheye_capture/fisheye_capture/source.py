@@ -9,7 +9,7 @@ import numpy as np
 
 from fisheye_geometry.camera_file import Camera
 from fisheye_geometry.coded_picture import decoded
-from fisheye_geometry.encodings import converted
+from fisheye_geometry.encodings import from_opencv
 from fisheye_geometry.errors import SourceError
 
 
@@ -58,7 +58,7 @@ class JpegFrame:
     @cached_property
     def image(self) -> np.ndarray:
         """Pixels in the wanted encoding; raises an `ImageFormatError` if they are broken."""
-        return encoded(decoded(self.jpeg), self.encoding)
+        return from_opencv(decoded(self.jpeg), self.encoding)
 
 
 class Source(ABC):
@@ -98,8 +98,3 @@ class Source(ABC):
 def shown_source(source: str) -> str:
     """Give a source as others may read it: a URL without its user and password."""
     return re.sub('://[^/]*@', '://', source)
-
-
-def encoded(image: np.ndarray, encoding: str) -> np.ndarray:
-    """Turn OpenCV's picture, (height, width[, 3]) grey or BGR, into one of an encoding."""
-    return converted(image, 'mono8' if image.ndim == 2 else 'bgr8', encoding)

@@ -5,8 +5,8 @@ import numpy as np
 from fisheye_capture.pace import PacedSource
 from fisheye_capture.scene import Scene
 from fisheye_capture.settings import CaptureSettings
-from fisheye_capture.source import encoded
 from fisheye_geometry.camera_file import Camera
+from fisheye_geometry.encodings import from_opencv
 from fisheye_geometry.lens import FisheyeLens
 from fisheye_geometry.remap import Turn
 
@@ -27,7 +27,7 @@ class SyntheticSource(PacedSource):
         self._encoding = settings.encoding
 
     def _picture(self, stamp_ns):
-        return encoded(self._view.frame(stamp_ns), self._encoding)
+        return from_opencv(self._view.frame(stamp_ns), self._encoding)
 
 
 def synthetic_lens(width: int, height: int, fov_rad: float) -> FisheyeLens:

@@ -35,3 +35,13 @@ def converted(image: np.ndarray, encoding: str, wanted: str) -> np.ndarray:
     if encoding == wanted:
         return image
     return cv2.cvtColor(image, _CHANGES[encoding, wanted])
+
+
+def from_opencv(image: np.ndarray, wanted: str) -> np.ndarray:
+    """Give a picture of OpenCV's, (height, width[, 3]) grey or BGR, in an encoding."""
+    return converted(image, 'mono8' if image.ndim == 2 else 'bgr8', wanted)
+
+
+def to_opencv(image: np.ndarray, encoding: str) -> np.ndarray:
+    """Give a picture in an encoding as OpenCV takes it: (height, width[, 3]) grey or BGR."""
+    return converted(image, encoding, 'mono8' if encoding == 'mono8' else 'bgr8')

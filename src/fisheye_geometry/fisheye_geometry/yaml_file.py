@@ -3,6 +3,7 @@
 import os
 import sys
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,16 @@ import yaml
 from fisheye_geometry.errors import CameraFileError
 
 _MAX_BYTES = 1_000_000
+
+
+def is_missing(path: str | Path) -> bool:
+    """Whether there is no such file; of one that cannot be looked at, `read_mapping` tells."""
+    with suppress(OSError):
+        try:
+            Path(path).stat()
+        except (FileNotFoundError, ValueError):  # no file has a zero byte in its name
+            return True
+    return False
 
 
 def read_mapping(path: str | Path) -> dict:

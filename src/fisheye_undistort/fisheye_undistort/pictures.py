@@ -8,6 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from fisheye_geometry.encodings import from_opencv
 from fisheye_geometry.errors import SourceError
 from fisheye_geometry.picture_file import SUFFIXES, is_picture, pictures_in, read_picture
 
@@ -91,7 +92,7 @@ def _frames(path: Path) -> Iterator[Picture]:
                 read, frame = video.retrieve()
                 if not read:
                     break
-                gray = frame if frame.ndim == 2 else cv2.cvtColor(frame, cv2.COLOR_BGR2GRAY)
+                gray = from_opencv(frame, 'mono8')
                 yield Picture(f'{path.name} frame {number}', gray, moving=True)
             number += 1
     finally:

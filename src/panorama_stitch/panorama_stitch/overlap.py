@@ -108,7 +108,6 @@ class _Measurement:
         self._surfaces = surface_left, surface_right
         self._settings = settings
         self._half_start = surface_left.width - surface_left.width // 2
-        self._level_x = surface_left.center_x_px - surface_right.center_x_px
 
     def run(self, method: str) -> Overlap:
         if method == 'paper':
@@ -166,9 +165,10 @@ class _Measurement:
         s = self._settings
         if isnan(s.expected_yaw_deg) or not self._surfaces[0].turns_are_shifts:
             return Search.x_px
-        first = self._level_x - self._half_start
+        left, right = self._surfaces
+        first = left.center_x_px - right.center_x_px - self._half_start
         return tuple(
-            first + self._surfaces[0].focal_px * radians(s.expected_yaw_deg + by)
+            first + left.focal_px * radians(s.expected_yaw_deg + by)
             for by in (-s.yaw_tolerance_deg, s.yaw_tolerance_deg)
         )
 

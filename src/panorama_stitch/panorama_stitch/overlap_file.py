@@ -2,14 +2,13 @@
 
 import os
 from collections.abc import Sequence
-from contextlib import suppress
 from math import degrees, inf, radians
 from pathlib import Path
 
 from fisheye_geometry.errors import CameraFileError
 from fisheye_geometry.remap import Turn
 from fisheye_geometry.surface import Surface
-from fisheye_geometry.yaml_file import is_number, read_mapping, shown, write_mapping
+from fisheye_geometry.yaml_file import is_missing, is_number, read_mapping, shown, write_mapping
 from panorama_stitch.overlap_result import Overlap
 from panorama_stitch.overlap_settings import METHODS
 
@@ -69,10 +68,8 @@ def read_overlaps(
         names the file and what does not fit.
     """
     path = os.path.expanduser(path)
-    with suppress(OSError):
-        # What cannot even be looked at is no missing file; reading it says why.
-        if not path or not Path(path).exists():
-            return None
+    if not path or is_missing(path):
+        return None
     entries = read_mapping(path)
     try:
         if entries.get('version') != VERSION:

@@ -14,7 +14,7 @@ from fisheye_bridge.qos import LATCHED
 from fisheye_bridge.running import spin_until, started
 from fisheye_bridge.stamps import ns_of
 from fisheye_bridge.topics import ImageSubscription
-from fisheye_geometry.encodings import converted
+from fisheye_geometry.encodings import to_opencv
 from fisheye_geometry.errors import FisheyeError, SettingError, SourceError
 from panorama_stitch.snapshot import FORMATS, save
 
@@ -42,8 +42,7 @@ class SnapshotNode(Node):
         surface = self._surface
         # Behind a new projection there may still be a picture of the old one.
         if surface and image.shape[1::-1] == (surface.width, surface.height):
-            image = converted(image, encoding, 'mono8' if encoding == 'mono8' else 'bgr8')
-            self.taken = image, surface, ns_of(header.stamp)
+            self.taken = to_opencv(image, encoding), surface, ns_of(header.stamp)
 
     def wait(self, timeout_s: float) -> tuple:
         """Spin until a panorama was taken; a `SourceError` if none comes."""
