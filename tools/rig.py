@@ -1,12 +1,16 @@
 """A rig as real processes: the installed executables in a ROS domain of their own."""
 
+import fcntl
 import os
 import random
 import re
 import signal
 import subprocess
+import tempfile
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from ament_index_python.packages import get_package_prefix
@@ -23,6 +27,8 @@ SEPARATE = ('left/capture', 'right/capture', 'left/undistort', 'right/undistort'
 """The five nodes of a rig; `COMPOSED` does the same in one."""
 COMPOSED = ('panorama',)
 _STOP_TIMEOUT_S = 10.0
+_domain_locks: deque = deque(maxlen=20)
+"""Open files whose locks keep the last domains picked here; what falls out is free again."""
 
 
 def executable(node: str) -> Path:
@@ -33,8 +39,15 @@ def executable(node: str) -> Path:
 
 
 def unused_domain() -> int:
-    """Pick a ROS domain that a system beside this one hardly uses."""
-    return random.randint(1, 100)
+    """Pick a ROS domain that no other test on this machine uses."""
+    for domain in random.sample(range(1, 101), 100):
+        lock = Path(tempfile.gettempdir(), f'fisheye-domain-{domain}.lock').open('w')  # noqa: SIM115
+        with suppress(BlockingIOError):
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            _domain_locks.append(lock)
+            return domain
+        lock.close()
+    raise RuntimeError('every ROS domain from 1 to 100 is in use by a test')
 
 
 def wait_for(condition: Callable[[], object], timeout_s: float, what: str) -> object:

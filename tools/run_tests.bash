@@ -2,7 +2,11 @@
 # `make test` calls this in a shell that has sourced env.bash.
 
 export PYTHONDONTWRITEBYTECODE=1  # no caches among the sources
-export ROS_DOMAIN_ID=$((RANDOM % 100 + 1))  # apart from other nodes on this machine
+for domain in $(shuf -i 1-100); do  # apart from other tests on this machine, as tools/rig.py does
+  exec 9> "${TMPDIR:-/tmp}/fisheye-domain-$domain.lock"
+  flock --nonblock 9 && break
+done
+export ROS_DOMAIN_ID=$domain
 colcon test-result --delete-yes > /dev/null
 colcon test --base-paths src --executor sequential \
   --event-handlers console_direct+ --return-code-on-test-failure

@@ -11,9 +11,8 @@ from fisheye_geometry.errors import SettingError
 from fisheye_geometry.remap import RemapTable
 from fisheye_geometry.surface import surface_for
 from fisheye_undistort.calibration import Calibration
+from fisheye_undistort.figure_file import check_suffix, write_figure
 from fisheye_undistort.report import Report
-
-FORMATS = ('.png', '.pdf', '.svg')
 
 _SIZE_INCH = (16, 9.5)
 _TITLE = 150
@@ -29,13 +28,9 @@ def check_plot(path: Path) -> None:
     Raises
     ------
     SettingError
-        For another suffix than those of `FORMATS`, and for a folder that is not there.
+        For a suffix that is no format of a figure, and for a folder that is not there.
     """
-    if path.suffix.lower() not in FORMATS:
-        raise SettingError(
-            f"a plot '{path.name}' cannot be written; "
-            f'expected a name that ends in {", ".join(FORMATS)}'
-        )
+    check_suffix(path, 'a plot')
     if not os.path.isdir(path.parent):
         raise SettingError(f'the plot {path} cannot be written: there is no folder {path.parent}')
 
@@ -67,10 +62,7 @@ def plot_report(path: str | Path, report: Report, example: np.ndarray) -> None:
     _distortion(figure.add_subplot(grid[1, 0]), report)
     _views(figure.add_subplot(grid[1, 1]), calibration)
     _undistorted(figure.add_subplot(grid[1, 2]), calibration, example)
-    try:
-        figure.savefig(path, dpi=110)
-    except (OSError, ValueError) as error:
-        raise SettingError(f'the plot {path} cannot be written: {error}') from error
+    write_figure(figure, Path(path), dpi=110)
 
 
 def _points(axes, calibration: Calibration, picture: np.ndarray) -> None:

@@ -9,9 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
 from fisheye_geometry.errors import SettingError
+from fisheye_undistort.figure_file import check_suffix, write_figure
 from fisheye_undistort.target import Target, marker_dictionary
-
-FORMATS = ('.pdf', '.svg', '.png')
 
 _PAPERS_MM = {
     'A4': (210, 297),
@@ -35,20 +34,13 @@ def write_sheet(path: str | Path, target: Target) -> str:
     Raises
     ------
     SettingError
-        For another suffix than those of `FORMATS`, a target that fits no paper, or a file that
+        For a suffix that is no format of a figure, a target that fits no paper, or a file that
         cannot be written.
     """
     path = Path(path)
-    if path.suffix.lower() not in FORMATS:
-        raise SettingError(
-            f"a sheet '{path.name}' cannot be written; "
-            f'expected a name that ends in {", ".join(FORMATS)}'
-        )
+    check_suffix(path, 'a sheet')
     paper, size_mm = paper_for(target)
-    try:
-        _draw(target, paper, size_mm).savefig(path, dpi=300)
-    except OSError as error:
-        raise SettingError(f'{path} cannot be written: {error.strerror}') from error
+    write_figure(_draw(target, paper, size_mm), path, dpi=300)
     return paper
 
 
