@@ -24,8 +24,8 @@ def check_suffix(path: Path, what: str) -> None:
         )
 
 
-def write_figure(figure: Figure, path: Path, dpi: float) -> None:
-    """Write a figure in the format that the name says.
+def write_figure(figure: Figure, path: Path, what: str, dpi: float) -> None:
+    """Write a figure in the format that the name says; `what` it is, for the sentence.
 
     Raises
     ------
@@ -36,4 +36,4 @@ def write_figure(figure: Figure, path: Path, dpi: float) -> None:
         figure.savefig(path, dpi=dpi)
     except (OSError, ValueError) as error:
         reason = getattr(error, 'strerror', None) or error
-        raise SettingError(f'{path} cannot be written: {reason}') from error
+        raise SettingError(f'{what} {path} cannot be written: {reason}') from error

@@ -62,7 +62,7 @@ def plot_report(path: str | Path, report: Report, example: np.ndarray) -> None:
     _distortion(figure.add_subplot(grid[1, 0]), report)
     _views(figure.add_subplot(grid[1, 1]), calibration)
     _undistorted(figure.add_subplot(grid[1, 2]), calibration, example)
-    write_figure(figure, Path(path), dpi=110)
+    write_figure(figure, Path(path), 'the plot', dpi=110)
 
 
 def _points(axes, calibration: Calibration, picture: np.ndarray) -> None:

@@ -40,7 +40,7 @@ def write_sheet(path: str | Path, target: Target) -> str:
     path = Path(path)
     check_suffix(path, 'a sheet')
     paper, size_mm = paper_for(target)
-    write_figure(_draw(target, paper, size_mm), path, dpi=300)
+    write_figure(_draw(target, paper, size_mm), path, 'the sheet', dpi=300)
     return paper
 
 
