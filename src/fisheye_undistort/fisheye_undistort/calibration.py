@@ -10,7 +10,7 @@ from fisheye_geometry.lens import FisheyeLens
 from fisheye_undistort.circle_bias import center_bias
 from fisheye_undistort.first_guess import first_guess
 from fisheye_undistort.lens_fit import GROUPS, Estimate, View, fit
-from fisheye_undistort.sheet_model import UNKNOWNS, bend, lens_of, to_camera
+from fisheye_undistort.sheet_model import UNKNOWNS, lens_of, to_camera, warp_board
 from fisheye_undistort.target import Target
 
 _ORDER = (
@@ -21,7 +21,7 @@ _ORDER = (
     'aspect ratio',
     'k3',
     'k4',
-    'bulge',
+    'board warp',
 )
 MODELS = tuple(_ORDER[:count] for count in range(1, len(_ORDER) + 1))
 """What is fitted, from what every picture tells to what only many can."""
@@ -32,9 +32,9 @@ _ROUGH = 1e-3
 """Relative change of the cost at which a fit is good enough to start the next from."""
 _BIAS_ROUNDS = 6
 _BIAS_SETTLED_PX = 0.002
-_MISFIT = 4.0
+_OUTLIER_RATIO = 4.0
 """A view whose rms is this many times the median does not show what the others show."""
-_MISFIT_WIDTHS = 1 / 1000
+_OUTLIER_WIDTHS = 1 / 1000
 """Nor is any view dropped whose rms is below this share of the picture's width."""
 _LEAST_COST_PX2 = 1e-8
 
@@ -77,7 +77,7 @@ class Calibration:
     @property
     def directions_rad(self) -> tuple[np.ndarray, np.ndarray]:
         """Angle from the axis and about it of the target's points, all views in one array."""
-        points = bend(self.target.points_mm, self.estimate.bulge_mm)
+        points = warp_board(self.target.points_mm, self.estimate.board_warp_mm)
         x, y, z = np.concatenate(
             [
                 to_camera(pose, points[view.ids])
@@ -112,7 +112,7 @@ def calibrate(
         raise CalibrationError('there is no view of the target to calibrate from')
     try:
         with np.errstate(divide='raise', invalid='raise'):
-            fitter, estimate, dropped = _fit_without_misfits(views, target, size, correct_bias)
+            fitter, estimate, dropped = _fit_without_outliers(views, target, size, correct_bias)
         lens = lens_of(estimate.unknowns, size)
     except (FloatingPointError, np.linalg.LinAlgError, CalibrationError) as error:
         raise CalibrationError(
@@ -122,20 +122,20 @@ def calibrate(
     return Calibration(lens, estimate, tuple(fitter.views), dropped, target)
 
 
-def _fit_without_misfits(views, target, size, correct_bias):
+def _fit_without_outliers(views, target, size, correct_bias):
     """Fit, leave out the views that do not fit, and fit again until all do."""
     fitter, dropped = _Fitter(views, target, size, correct_bias), {}
     while True:
-        ladder = fitter.climb()
-        misfits = _misfits(ladder[-1], size)
-        if not misfits.any():
-            return fitter, fitter.choose(ladder), dropped
-        rms = ladder[-1].rms_px[misfits]
+        sequence = fitter.fit_sequence()
+        outliers = _outlying_views(sequence[-1], size)
+        if not outliers.any():
+            return fitter, fitter.choose(sequence), dropped
+        rms = sequence[-1].rms_px[outliers]
         dropped |= {
             view.name: f'does not fit: rms {miss:.2f} px'
-            for view, miss in zip(compress(fitter.views, misfits), rms, strict=True)
+            for view, miss in zip(compress(fitter.views, outliers), rms, strict=True)
         }
-        fitter = _Fitter([*compress(fitter.views, ~misfits)], target, size, correct_bias)
+        fitter = _Fitter([*compress(fitter.views, ~outliers)], target, size, correct_bias)
 
 
 class _Fitter:
@@ -155,21 +155,21 @@ class _Fitter:
             self.views, self._target.points_mm, estimate, self._start.unknowns, free, bias, **how
         )
 
-    def climb(self) -> list[Estimate]:
+    def fit_sequence(self) -> list[Estimate]:
         """Fit each model roughly, the next from where the last one ended."""
-        ladder = [self._start]
+        sequence = [self._start]
         for free in self._models:
-            ladder.append(self._fit(ladder[-1], free, None, tolerance=_ROUGH))
-        return ladder[1:]
+            sequence.append(self._fit(sequence[-1], free, None, tolerance=_ROUGH))
+        return sequence[1:]
 
-    def choose(self, ladder: list[Estimate]) -> Estimate:
+    def choose(self, sequence: list[Estimate]) -> Estimate:
         """Fit the richest model, then poorer ones for as long as they explain the data better.
 
         The Bayesian information criterion asks of each intrinsic that it lowers the cost by more
         than chance would (Schwarz 1978, doi 10.1214/aos/1176344136).
         """
         best, bias = None, None
-        for start in reversed(ladder):
+        for start in reversed(sequence):
             estimate, bias = self._without_bias(start, bias)
             variance = max(estimate.cost, _LEAST_COST_PX2) / self._equations
             criterion = self._equations * np.log(variance)
@@ -198,7 +198,7 @@ def _change(before, after) -> float:
     return float(np.abs(np.concatenate(before) - np.concatenate(after)).max())
 
 
-def _misfits(estimate: Estimate, size: tuple[int, int]) -> np.ndarray:
+def _outlying_views(estimate: Estimate, size: tuple[int, int]) -> np.ndarray:
     """Mark the views (V,) that the lens does not explain as it explains the others."""
     rms = estimate.rms_px
-    return rms > max(_MISFIT * np.median(rms), _MISFIT_WIDTHS * size[0])
+    return rms > max(_OUTLIER_RATIO * np.median(rms), _OUTLIER_WIDTHS * size[0])

@@ -3,7 +3,7 @@
 import numpy as np
 
 from fisheye_undistort.lens_fit import Estimate, View
-from fisheye_undistort.sheet_model import bend, project, to_camera
+from fisheye_undistort.sheet_model import project, to_camera, warp_board
 from fisheye_undistort.target import Target
 
 _RIM = np.linspace(0, 2 * np.pi, 32, endpoint=False)
@@ -19,7 +19,7 @@ def center_bias(estimate: Estimate, views: list[View], target: Target) -> list[n
     rim = target.radius_mm * np.stack([np.cos(_RIM), np.sin(_RIM), 0 * _RIM], axis=-1)
     biases = []
     for pose, view in zip(estimate.poses, views, strict=True):
-        centers = bend(target.points_mm, estimate.bulge_mm)[view.ids]
+        centers = warp_board(target.points_mm, estimate.board_warp_mm)[view.ids]
         rims = to_camera(pose, centers[:, None] + rim)
         outline = project(estimate.unknowns, rims.reshape(-1, 3))[0].reshape(*rims.shape[:2], 2)
         middle = project(estimate.unknowns, to_camera(pose, centers))[0]

@@ -97,7 +97,7 @@ class Collector:
             self._largest, self.example = extent, picture.gray
 
     def finish(self) -> list[View]:
-        """Give the views.
+        """Return the views.
 
         Raises
         ------
@@ -119,7 +119,7 @@ class Collector:
         return self.views
 
     def progress(self) -> str:
-        """Say how far the collection has come."""
+        """Describe how far the collection has come."""
         if not self.views:
             return 'no view of the target yet'
         points = np.concatenate([view.points_px for view in self.views])

@@ -29,14 +29,14 @@ def first_guess(views: list[View], points_mm: np.ndarray, size: tuple[int, int])
         unknowns = np.zeros(len(UNKNOWNS))
         unknowns[:4] = focal, focal, (width - 1) / 2, (height - 1) / 2
         poses = np.array([_pose(view, points_mm, lens_of(unknowns, size)) for view in views])
-        misses = [
+        residuals = [
             np.linalg.norm(
                 project(unknowns, to_camera(pose, points_mm[view.ids]))[0] - view.points_px,
                 axis=-1,
             ).mean()
             for pose, view in zip(poses, views, strict=True)
         ]
-        candidates.append((float(np.median(misses)), focal, Estimate(unknowns, poses)))
+        candidates.append((float(np.median(residuals)), focal, Estimate(unknowns, poses)))
     return min(candidates, key=lambda candidate: candidate[0])[2]
 
 

@@ -94,31 +94,31 @@ class _Neighbourhood:
         mismatch_mm : float
             Mean distance of the circles from where the steps led.
         """
-        cells, misses, steps, order = {}, [], [], count()
-        circle, cell, miss = seed, (0, 0), 0.0
+        cells, residuals, steps, order = {}, [], [], count()
+        circle, cell, residual = seed, (0, 0), 0.0
         while True:
             if circle not in cells and cell not in cells.values():
                 cells[circle] = cell
-                misses.append(miss)
-                for miss, *step in self._steps_from(circle, cell, jacobian):
-                    heappush(steps, (miss, next(order), step))
+                residuals.append(residual)
+                for residual, *step in self._steps_from(circle, cell, jacobian):
+                    heappush(steps, (residual, next(order), step))
             if not steps:
-                return cells, float(np.mean(misses))
-            miss, _, (circle, cell, jacobian) = heappop(steps)
+                return cells, float(np.mean(residuals))
+            residual, _, (circle, cell, jacobian) = heappop(steps)
 
     def _steps_from(self, at: int, cell: tuple, jacobian: np.ndarray):
         """Steps to the neighbours of a circle: mismatch, circle, cell, and the Jacobian there."""
         near = self._near(at)
         there = self._carry(jacobian, near)
         offsets = self._offsets_mm(at, near, jacobian, there)
-        misses = np.linalg.norm(offsets - self._steps_mm[:, None], axis=-1)
-        which, where = np.nonzero(misses < self._limit_mm)
+        residuals = np.linalg.norm(offsets - self._steps_mm[:, None], axis=-1)
+        which, where = np.nonzero(residuals < self._limit_mm)
         # Where the step really led tells how far the turn has drifted on the way here.
         drift = _angle(offsets[where]) - _angle(self._steps_mm[which])
         corrected = there[where] @ _rotations(drift)
         for step, other, turned in zip(which, where, corrected, strict=True):
             following = (cell[0] + self._steps[step][0], cell[1] + self._steps[step][1])
-            yield float(misses[step, other]), int(near[other]), following, turned
+            yield float(residuals[step, other]), int(near[other]), following, turned
 
     def _near(self, at: int) -> np.ndarray:
         """Circles within reach of one step."""

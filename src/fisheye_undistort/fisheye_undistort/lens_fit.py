@@ -1,4 +1,4 @@
-"""Least squares over a lens, the bulge of the sheet and its poses, with analytic derivatives."""
+"""Least squares over a lens, the warp of the board and its poses, with analytic derivatives."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from scipy.optimize import least_squares
 
-from fisheye_undistort.sheet_model import INTRINSICS, UNKNOWNS, bend, curves, project
+from fisheye_undistort.sheet_model import INTRINSICS, UNKNOWNS, curves, project, warp_board
 
 
 def _alone(*names: str) -> np.ndarray:
@@ -22,7 +22,7 @@ GROUPS = {
     'k3': _alone('k3'),
     'k4': _alone('k4'),
     'aspect ratio': _alone('focal_y_px'),
-    'bulge': _alone('bulge_xx_mm', 'bulge_xy_mm', 'bulge_yy_mm'),
+    'board warp': _alone('warp_xx_mm', 'warp_xy_mm', 'warp_yy_mm'),
 }
 """What is fitted together or left as it is: directions in the space of the unknowns."""
 
@@ -81,8 +81,8 @@ class Estimate:
     free: tuple[str, ...] = ()
 
     @property
-    def bulge_mm(self) -> np.ndarray:
-        """(3,) as `bend` takes it."""
+    def board_warp_mm(self) -> np.ndarray:
+        """(3,) as `warp_board` takes it."""
         return self.unknowns[len(INTRINSICS) :]
 
     @property
@@ -135,11 +135,11 @@ def fit(
         max_nfev=_MAX_EVALUATIONS,
     )
     unknowns, poses = problem.unpack(solution.x)
-    misses = problem.misses_px(solution.x)
+    residuals = problem.residuals_px(solution.x)
     return Estimate(
         unknowns,
         poses,
-        residuals_px=tuple(-part for part in np.split(misses, problem.splits)),
+        residuals_px=tuple(-part for part in np.split(residuals, problem.splits)),
         covariance=problem.covariance(solution),
         cost=2 * solution.cost,
         free=free,
@@ -162,7 +162,7 @@ class _Problem:
         self._nominal = nominal
 
     def pack(self, estimate):
-        """Give the vector whose unknowns are nearest to those of an estimate."""
+        """Return the vector whose unknowns are nearest to those of an estimate."""
         change = estimate.unknowns - self._nominal
         free = np.linalg.lstsq(self._basis, change, rcond=None)[0]
         return np.concatenate([free, estimate.poses.ravel()])
@@ -172,22 +172,22 @@ class _Problem:
         count = self._basis.shape[1]
         return self._nominal + self._basis @ vector[:count], vector[count:].reshape(-1, _POSE)
 
-    def misses_px(self, vector):
+    def residuals_px(self, vector):
         """Predicted minus found, (N, 2)."""
         unknowns, poses = self.unpack(vector)
         points, _, _ = self._to_camera(unknowns, poses)
         return project(unknowns, points)[0] - self._found
 
     def residuals(self, vector):
-        """Misses (2 N,) px, damped so that the sum of their squares is a robust cost."""
-        return _damp(self.misses_px(vector))[0].ravel()
+        """Residuals (2 N,) px, damped so that the sum of their squares is a robust cost."""
+        return _damp(self.residuals_px(vector))[0].ravel()
 
     def jacobian(self, vector):
         """Derivatives of `residuals`, (2 N, len(vector))."""
         unknowns, poses = self.unpack(vector)
-        points, by_turn, by_bulge = self._to_camera(unknowns, poses)
+        points, by_turn, by_warp = self._to_camera(unknowns, poses)
         pixels, by_intrinsics, by_point = project(unknowns, points)
-        by_unknowns = np.concatenate([by_intrinsics, by_point @ by_bulge], axis=-1)
+        by_unknowns = np.concatenate([by_intrinsics, by_point @ by_warp], axis=-1)
         count = self._basis.shape[1]
         jacobian = np.zeros((len(points), 2, len(vector)))
         jacobian[:, :, :count] = by_unknowns @ self._basis
@@ -198,11 +198,11 @@ class _Problem:
         return jacobian.reshape(-1, len(vector))
 
     def _to_camera(self, unknowns, poses):
-        """Points (N, 3) in the camera's frame, and derivatives (N, 3, 3) by turn and bulge."""
+        """Points (N, 3) in the camera's frame, derivatives (N, 3, 3) by turn and warp."""
         pairs = [cv2.Rodrigues(pose[:3]) for pose in poses]
         rotation = np.array([matrix for matrix, _ in pairs])[self._view]
         slopes = np.array([slope.reshape(3, 3, 3) for _, slope in pairs])[self._view]
-        sheet = bend(self._points, unknowns[len(INTRINSICS) :])[self._ids]
+        sheet = warp_board(self._points, unknowns[len(INTRINSICS) :])[self._ids]
         points = np.einsum('nij,nj->ni', rotation, sheet) + poses[self._view, 3:]
         by_turn = np.einsum('nkij,nj->nik', slopes, sheet)
         return points, by_turn, rotation[:, :, 2:] * curves(self._points)[self._ids, None]
@@ -219,13 +219,13 @@ class _Problem:
         return self._basis @ covariance @ self._basis.T
 
 
-def _damp(misses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _damp(residuals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Pseudo-Huber: values whose squares grow linearly beyond `_OUTLIER_PX`, and their slopes.
 
     `least_squares` knows this loss by itself, but not together with MINPACK's method, which took
     a tenth of the time on a machine that other programs use too.
     """
-    root = np.sqrt(1 + (misses / _OUTLIER_PX) ** 2)
-    # misses^2 / (root + 1) is 2 (root - 1) without the cancellation near 0.
+    root = np.sqrt(1 + (residuals / _OUTLIER_PX) ** 2)
+    # residuals^2 / (root + 1) is 2 (root - 1) without the cancellation near 0.
     shrink = np.sqrt(2 / (root + 1))
-    return misses * shrink, 1 / (root * shrink)
+    return residuals * shrink, 1 / (root * shrink)

@@ -61,7 +61,7 @@ def read_pictures(paths: Iterable[str | Path], half: str = '') -> Iterator[Pictu
 
 
 def cut(gray: np.ndarray, half: str) -> np.ndarray:
-    """Give one half of a side-by-side picture, or all of it."""
+    """Return one half of a side-by-side picture, or all of it."""
     middle = gray.shape[1] // 2
     parts = {'': gray, 'left': gray[:, :middle], 'right': gray[:, middle:]}
     return np.ascontiguousarray(parts[half])

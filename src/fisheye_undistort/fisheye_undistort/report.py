@@ -1,4 +1,4 @@
-"""Say what a calibration is worth: figures, and a verdict with its reasons."""
+"""What a calibration is worth: figures, and a verdict with its reasons."""
 
 from dataclasses import dataclass
 from functools import cached_property

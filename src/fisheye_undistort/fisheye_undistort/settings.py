@@ -44,7 +44,7 @@ class SurfaceSettings:
     )
 
     def surface_of(self, lens: Lens) -> Surface:
-        """Give the surface on which a camera's pictures are corrected."""
+        """Return the surface on which a camera's pictures are corrected."""
         width, height = self._size
         return surface_for(
             lens,

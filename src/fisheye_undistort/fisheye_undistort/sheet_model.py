@@ -6,7 +6,7 @@ import numpy as np
 from fisheye_geometry.lens import FisheyeLens
 
 INTRINSICS = ('focal_x_px', 'focal_y_px', 'center_x_px', 'center_y_px', 'k1', 'k2', 'k3', 'k4')
-UNKNOWNS = (*INTRINSICS, 'bulge_xx_mm', 'bulge_xy_mm', 'bulge_yy_mm')
+UNKNOWNS = (*INTRINSICS, 'warp_xx_mm', 'warp_xy_mm', 'warp_yy_mm')
 """What all views have in common."""
 
 _EVEN_POWERS = 2.0 * np.arange(1, 5)
@@ -23,7 +23,7 @@ def to_camera(pose: np.ndarray, points_mm: np.ndarray) -> np.ndarray:
     return points_mm @ cv2.Rodrigues(pose[:3])[0].T + pose[3:]
 
 
-def bend(points_mm: np.ndarray, bulge_mm: np.ndarray) -> np.ndarray:
+def warp_board(points_mm: np.ndarray, board_warp_mm: np.ndarray) -> np.ndarray:
     """Points (M, 3) of a sheet that is not quite flat.
 
     Paper and board never are, and the lens would be bent to make up for it: 1 mm on a 25 cm sheet
@@ -34,16 +34,16 @@ def bend(points_mm: np.ndarray, bulge_mm: np.ndarray) -> np.ndarray:
     ----------
     points_mm
         (M, 3) as they were printed.
-    bulge_mm
+    board_warp_mm
         (3,) depth at the outermost points with x^2, x y and y^2.
     """
-    bent = points_mm.copy()
-    bent[:, 2] += curves(points_mm) @ bulge_mm
-    return bent
+    warped = points_mm.copy()
+    warped[:, 2] += curves(points_mm) @ board_warp_mm
+    return warped
 
 
 def curves(points_mm: np.ndarray) -> np.ndarray:
-    """Derivatives (M, 3) of the depths of `bend` by the bulge."""
+    """Derivatives (M, 3) of the depths of `warp_board` by the board warp."""
     x, y = (points_mm[:, :2] / np.abs(points_mm[:, :2]).max()).T
     return np.stack([x * x, x * y, y * y], axis=-1)
 

@@ -145,7 +145,7 @@ STANDARD = {
 
 
 def marker_dictionary():
-    """Give OpenCV's dictionary of the markers on a `charuco` sheet.
+    """Return OpenCV's dictionary of the markers on a `charuco` sheet.
 
     Raises
     ------

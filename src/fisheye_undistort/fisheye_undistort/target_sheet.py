@@ -45,7 +45,7 @@ def write_sheet(path: str | Path, target: Target) -> str:
 
 
 def sheet_picture(target: Target, px_per_mm: float) -> tuple[np.ndarray, np.ndarray]:
-    """Give the sheet as a picture.
+    """Return the sheet as an image.
 
     Returns
     -------

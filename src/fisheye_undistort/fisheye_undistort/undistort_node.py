@@ -48,7 +48,7 @@ class UndistortNode(Node):
         self._rebuild(self._declared.settings)
 
     def _rebuild(self, settings):
-        """Have the maps built in the background; frames use the old ones until then."""
+        """Build the maps in the background; frames use the old ones until then."""
         lens = self._camera.lens if self._camera else None
         if lens is None:
             return

@@ -15,7 +15,7 @@ DATA = Path(os.environ.get('FISHEYE_DATA', ''))
 
 
 def fisheye(fov_deg: int, scale: int = 1) -> FisheyeLens:
-    """Give a lens that sees 170 or 190 degrees across 640 * scale pixels."""
+    """Return a lens that sees 170 or 190 degrees across 640 * scale pixels."""
     focal, distortion = {
         170: (215.0, (0.02, -0.01, 0.003, -0.0008)),
         190: (199.0, (-0.03, 0.003, -0.006, 0.0015)),
@@ -32,14 +32,14 @@ def fisheye(fov_deg: int, scale: int = 1) -> FisheyeLens:
 
 
 def seen_exactly(lens, target, pose, name='view') -> View:
-    """Give the projections of a target's points."""
+    """Return the projections of a target's points."""
     points = target.points_mm @ pose.rotation.T + pose.translation_mm
     return View(name, lens.project(points)[0], np.arange(len(points)))
 
 
 @pytest.fixture
 def shun74() -> Path:
-    """Give the folder of real chessboard views."""
+    """Return the folder of real chessboard views."""
     path = DATA / 'shun74'
     if not path.is_dir():
         message = f'{path} is not there: real pictures are looked for in $FISHEYE_DATA'
@@ -51,19 +51,19 @@ def shun74() -> Path:
 
 @pytest.fixture(scope='session')
 def paper_lens() -> FisheyeLens:
-    """Give the paper's lens: 170 degrees, 640 x 480."""
+    """Return the paper's lens: 170 degrees, 640 x 480."""
     return fisheye(170)
 
 
 @pytest.fixture(scope='session')
 def paper_poses(paper_lens):
-    """Give twelve poses of the paper's sheet."""
+    """Return twelve poses of the paper's sheet."""
     return scattered_poses(paper_lens, STANDARD['circles'], 12, (170, 300))
 
 
 @pytest.fixture(scope='session')
 def paper_pictures(paper_lens, paper_poses):
-    """Give twelve photographs of the paper's sheet."""
+    """Return twelve photographs of the paper's sheet."""
     return [
         render_view(paper_lens, STANDARD['circles'], pose, seed=seed)
         for seed, pose in enumerate(paper_poses)

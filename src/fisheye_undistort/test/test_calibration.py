@@ -13,7 +13,7 @@ from fisheye_undistort.circle_bias import center_bias
 from fisheye_undistort.detection import Detector
 from fisheye_undistort.lens_fit import Estimate, View
 from fisheye_undistort.pictures import read_pictures
-from fisheye_undistort.sheet_model import bend
+from fisheye_undistort.sheet_model import warp_board
 from fisheye_undistort.target import STANDARD, Target
 
 PAPER = STANDARD['circles']
@@ -31,7 +31,7 @@ STRAIGHT_PX = 1.0
 
 
 def angle_error_deg(lens, truth, up_to_rad):
-    """Give the largest error of the angle that the fitted lens assigns to a true one's radius."""
+    """Return the largest error of the angle that the fitted lens assigns to a true radius."""
     angles = np.linspace(0.01, up_to_rad, 100)
     rays = np.stack([np.sin(angles), 0 * angles, np.cos(angles)], axis=-1)
     pixels, seen = truth.project(rays)
@@ -96,8 +96,8 @@ def test_a_view_that_does_not_fit_is_dropped_and_named(exact_views, paper_lens):
 
 
 def test_a_board_that_is_not_flat_does_not_bend_the_lens(paper_lens):
-    bulge = np.array([1.2, 0.2, 0.6])
-    points = bend(BOARD.points_mm, bulge)
+    warp_mm = np.array([1.2, 0.2, 0.6])
+    points = warp_board(BOARD.points_mm, warp_mm)
     random = np.random.default_rng(0)
     views = [
         View(
@@ -109,8 +109,8 @@ def test_a_board_that_is_not_flat_does_not_bend_the_lens(paper_lens):
         for pose in scattered_poses(paper_lens, BOARD, 12, (120, 220), seed=2)
     ]
     calibration = calibrate(views, BOARD, SIZE)
-    assert 'bulge' in calibration.estimate.free
-    assert np.allclose(calibration.estimate.bulge_mm, bulge, atol=0.1)
+    assert 'board warp' in calibration.estimate.free
+    assert np.allclose(calibration.estimate.board_warp_mm, warp_mm, atol=0.1)
     demand(calibration.lens, paper_lens)
 
 

@@ -12,7 +12,7 @@ SIZE = (640, 480)
 
 @pytest.fixture
 def collector():
-    """Give a collector whose detector reads the place of the target from two pixels."""
+    """Return a collector whose detector reads the place of the target from two pixels."""
 
     def detect(name, gray):
         x, y = gray[0, :2].astype(float) * 2

@@ -23,7 +23,7 @@ TARGETS = {
 
 
 def images_of(lens, target, pose):
-    """Give the circles of a target as a perfect detector would: centres and local stretch."""
+    """Return the circles of a target as a perfect detector would: centres and local stretch."""
 
     def project(points):
         return lens.project(points @ pose.rotation.T + pose.translation_mm)[0]
@@ -38,7 +38,7 @@ def images_of(lens, target, pose):
 
 
 def same_order(points, ids, truth):
-    """Tell whether ids are right; symmetric grids may be turned by half a turn."""
+    """Return whether ids are right; symmetric grids may be turned by half a turn."""
     return any(np.abs(points - order[ids]).max() < NEAR_PX for order in (truth, truth[::-1]))
 
 

@@ -5,7 +5,7 @@ from rendered_view import scattered_poses
 
 from fisheye_undistort.first_guess import first_guess
 from fisheye_undistort.lens_fit import GROUPS, Estimate, View, _damp, _Problem, fit
-from fisheye_undistort.sheet_model import UNKNOWNS, bend, lens_of, project
+from fisheye_undistort.sheet_model import UNKNOWNS, lens_of, project, warp_board
 from fisheye_undistort.target import Target
 
 TARGET = Target('circles', 4, 5, 40, 40, radius_mm=15)
@@ -59,18 +59,18 @@ def test_derivatives_of_the_whole_problem(views):
 
 
 def test_far_points_count_linearly():
-    misses = np.array([-100.0, -0.01, 0.0, 0.01, 100.0])
-    damped, _ = _damp(misses)
-    assert np.allclose(damped[1:4], misses[1:4], rtol=1e-4)
+    residuals = np.array([-100.0, -0.01, 0.0, 0.01, 100.0])
+    damped, _ = _damp(residuals)
+    assert np.allclose(damped[1:4], residuals[1:4], rtol=1e-4)
     assert np.allclose(damped[[0, 4]] ** 2, 2 * 100, rtol=0.02)
-    assert np.all(np.sign(damped) == np.sign(misses))
+    assert np.all(np.sign(damped) == np.sign(residuals))
 
 
 def test_a_bulge_is_zero_in_the_middle_and_full_at_the_edge():
-    bent = bend(TARGET.points_mm, np.array([2.0, 0.0, 0.0]))
-    assert np.allclose(bent[:, :2], TARGET.points_mm[:, :2])
-    assert np.allclose(bent[::5, 2], 2.0)
-    assert np.allclose(bent[2::5, 2], 0.0)
+    warped = warp_board(TARGET.points_mm, np.array([2.0, 0.0, 0.0]))
+    assert np.allclose(warped[:, :2], TARGET.points_mm[:, :2])
+    assert np.allclose(warped[::5, 2], 2.0)
+    assert np.allclose(warped[2::5, 2], 0.0)
 
 
 def test_deviations_are_those_of_repeated_fits(views):
