@@ -17,8 +17,8 @@ from timing import Spread, interleaved, spread
 
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.surface import Surface
-from panorama_stitch.compositor import BLENDS, Compositor
-from panorama_stitch.layout import Layout
+from panorama_stitch.compose.compositor import BLENDS, Compositor
+from panorama_stitch.compose.layout import Layout
 from panorama_stitch.settings import PanoramaSettings
 
 SIZES = (640, 480), (1280, 960), (1920, 1080)

@@ -11,7 +11,7 @@ from pairs import DATA, folder_pair, synthetic_pair
 from rigs import random_rig
 
 from fisheye_geometry.surface import Surface, surface_for
-from panorama_stitch.view import View
+from panorama_stitch.compose.view import View
 
 WIDE_DEG = 15.0
 """Overlaps at least this wide must be found."""

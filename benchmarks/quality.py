@@ -20,7 +20,7 @@ from pairs import YAWS, Pair, real_pairs, synthetic_pair
 from fisheye_capture.scene import Scene
 from fisheye_geometry.errors import FisheyeError
 from fisheye_geometry.remap import Turn
-from panorama_stitch.compositor import BLENDS, Compositor
+from panorama_stitch.compose.compositor import BLENDS, Compositor
 from panorama_stitch.settings import PanoramaSettings
 
 EXPOSURES = (1.0, 1.0), (1.0, 1.3)

@@ -23,14 +23,14 @@ from fisheye_bridge.topics import ImagePublisher
 from fisheye_capture.rate import Rate
 from fisheye_geometry.encodings import converted
 from fisheye_geometry.errors import FisheyeError, SettingError
-from panorama_stitch.compositor import Compositor
+from panorama_stitch.compose.compositor import Compositor
+from panorama_stitch.compose.stale import write_age
 from panorama_stitch.figures import figures
 from panorama_stitch.live import LiveStitcher
 from panorama_stitch.overlap_result import Overlap as OverlapResult
 from panorama_stitch.overlap_result import apart_rad
 from panorama_stitch.overlap_settings import METHODS
 from panorama_stitch.settings import PanoramaOutputSettings
-from panorama_stitch.stale import write_age
 
 FRAME_ID = 'panorama_optical_frame'
 _LATENCIES = 300

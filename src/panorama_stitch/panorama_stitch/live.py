@@ -13,12 +13,12 @@ from fisheye_capture.rate import Rate
 from fisheye_geometry.errors import FisheyeError
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.surface import Surface
-from panorama_stitch.compositor import Compositor
+from panorama_stitch.compose.compositor import Compositor
+from panorama_stitch.compose.stale import dimmed
 from panorama_stitch.overlap_result import Overlap
 from panorama_stitch.pairing import FramePairing
 from panorama_stitch.preparation import Preparation
 from panorama_stitch.settings import PanoramaOutputSettings
-from panorama_stitch.stale import dimmed
 from panorama_stitch.stitcher import Stitcher
 
 _WAITING = 2

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from fisheye_geometry.background import Background
 from fisheye_geometry.errors import FisheyeError, OverlapError
-from panorama_stitch.compositor import Compositor
+from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.overlap_file import read_overlaps, write_overlaps
 from panorama_stitch.overlap_result import Overlap
 from panorama_stitch.settings import PanoramaOutputSettings

@@ -8,8 +8,8 @@ from fisheye_capture.settings import FrameSettings
 from fisheye_geometry.errors import SettingError
 from fisheye_geometry.settings import setting
 from fisheye_undistort.settings import SurfaceSettings
-from panorama_stitch.compositor import BLENDS
-from panorama_stitch.layout import CROPS
+from panorama_stitch.compose.compositor import BLENDS
+from panorama_stitch.compose.layout import CROPS
 from panorama_stitch.overlap_settings import OverlapSettings
 
 _NAME = re.compile(r'[A-Za-z]\w*(/[A-Za-z]\w*)*', re.ASCII)

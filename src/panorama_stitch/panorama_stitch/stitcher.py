@@ -12,14 +12,14 @@ from fisheye_geometry.errors import ImageFormatError, OverlapError
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.remap import LEVEL
 from fisheye_geometry.surface import Surface
-from panorama_stitch.compositor import BLENDS, Compositor
-from panorama_stitch.gain import GainCompensation
-from panorama_stitch.layout import lay_out
+from panorama_stitch.compose.compositor import BLENDS, Compositor
+from panorama_stitch.compose.gain import GainCompensation
+from panorama_stitch.compose.layout import lay_out
+from panorama_stitch.compose.seam import settle_seams
+from panorama_stitch.compose.view import View
 from panorama_stitch.overlap import measure_overlap
 from panorama_stitch.overlap_result import Overlap, side_by_side
-from panorama_stitch.seam import settle_seams
 from panorama_stitch.settings import PanoramaOutputSettings
-from panorama_stitch.view import View
 
 Group = Sequence[np.ndarray]
 """One picture of each camera, taken at the same time."""

@@ -13,7 +13,7 @@ from fisheye_geometry.image_circle import ImageCircle
 from fisheye_geometry.lens import FisheyeLens
 from fisheye_geometry.remap import LEVEL, RemapTable, Turn
 from fisheye_geometry.surface import Surface, surface_for
-from panorama_stitch.view import View
+from panorama_stitch.compose.view import View
 
 DATA = Path(os.environ.get('FISHEYE_DATA', ''))
 YAW_DEG = 140.0

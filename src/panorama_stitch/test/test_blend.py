@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from panorama_stitch.blend import Feather, Multiband
+from panorama_stitch.compose.blend import Feather, Multiband
 
 SHAPE = (90, 64, 3)
 EVERYWHERE = np.ones(SHAPE[:2], bool)

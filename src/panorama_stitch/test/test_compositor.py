@@ -12,10 +12,10 @@ from fisheye_geometry.errors import ImageFormatError
 from fisheye_geometry.lens import make_lens
 from fisheye_geometry.remap import Turn
 from fisheye_geometry.surface import surface_for
-from panorama_stitch.compositor import BLENDS, Compositor
-from panorama_stitch.gain import GainCompensation
-from panorama_stitch.layout import covered, lay_out
-from panorama_stitch.view import View
+from panorama_stitch.compose.compositor import BLENDS, Compositor
+from panorama_stitch.compose.gain import GainCompensation
+from panorama_stitch.compose.layout import covered, lay_out
+from panorama_stitch.compose.view import View
 
 YAW = np.radians(140)
 STAMP_NS = 700_000_000

@@ -7,10 +7,10 @@ from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.remap import Turn
 from fisheye_geometry.surface import surface_for
-from panorama_stitch.compositor import Compositor
-from panorama_stitch.gain import GainCompensation
-from panorama_stitch.layout import lay_out
-from panorama_stitch.view import View
+from panorama_stitch.compose.compositor import Compositor
+from panorama_stitch.compose.gain import GainCompensation
+from panorama_stitch.compose.layout import lay_out
+from panorama_stitch.compose.view import View
 
 YAW = np.radians(140)
 LENS = synthetic_lens(320, 240, np.radians(170))

@@ -6,7 +6,7 @@ from threading import Barrier, get_ident
 import cv2
 import pytest
 
-from panorama_stitch.parallel import share
+from panorama_stitch.compose.parallel import share
 
 TIMEOUT_S = 10.0
 

@@ -5,9 +5,9 @@ import pytest
 
 from fisheye_geometry.lens import make_lens
 from fisheye_geometry.surface import surface_for
-from panorama_stitch.layout import lay_out
-from panorama_stitch.seam import settle_seams
-from panorama_stitch.view import View
+from panorama_stitch.compose.layout import lay_out
+from panorama_stitch.compose.seam import settle_seams
+from panorama_stitch.compose.view import View
 
 SURFACE = surface_for(make_lens('plumb_bob', 200, 120, [150, 0, 99.5, 0, 150, 59.5, 0, 0, 1], []))
 OVERLAP_PX = 80

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from fisheye_geometry.surface import Surface
-from panorama_stitch.view import View
+from panorama_stitch.compose.view import View
 
 CROPS = ('valid', 'none')
 _MAX_TRIM_DEG = 3.0

@@ -12,8 +12,8 @@ from math import sqrt
 import cv2
 import numpy as np
 
-from panorama_stitch.layout import Layout
-from panorama_stitch.view import View
+from panorama_stitch.compose.layout import Layout
+from panorama_stitch.compose.view import View
 
 _AROUND_SEAM_DEG = 12.0
 """Width of the overlap in which brightness is compared."""

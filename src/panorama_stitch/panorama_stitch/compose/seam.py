@@ -7,8 +7,8 @@ from math import ceil, floor
 import cv2
 import numpy as np
 
-from panorama_stitch.layout import Layout, Seam
-from panorama_stitch.view import View
+from panorama_stitch.compose.layout import Layout, Seam
+from panorama_stitch.compose.view import View
 
 _LARGEST_DIFFERENCE = 40.0
 """Grey levels; what differs more is no worse."""

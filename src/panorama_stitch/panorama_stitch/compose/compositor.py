@@ -8,11 +8,11 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from panorama_stitch.blend import Blend, Feather, Multiband
-from panorama_stitch.gain import GainCompensation
-from panorama_stitch.layout import Layout, Seam
-from panorama_stitch.parallel import share
-from panorama_stitch.view import Cut, View
+from panorama_stitch.compose.blend import Blend, Feather, Multiband
+from panorama_stitch.compose.gain import GainCompensation
+from panorama_stitch.compose.layout import Layout, Seam
+from panorama_stitch.compose.parallel import share
+from panorama_stitch.compose.view import Cut, View
 
 _BLENDS = {'feather': Feather, 'multiband': Multiband}
 BLENDS = {'none': 0.0, 'feather': 1.0, 'multiband': 4.0}
