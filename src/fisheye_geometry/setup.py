@@ -10,5 +10,5 @@ setup(
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),
     ],
-    extras_require={'test': ['pytest']},
+    extras_require={'test': ['hypothesis', 'pytest']},
 )

@@ -20,7 +20,7 @@ setup(
         (f'share/{package_name}/config', glob('../../config/*.yaml') + glob('../../config/*.xml')),
         (f'share/{package_name}/config/calibration', glob('../../config/calibration/*.yaml')),
     ],
-    extras_require={'test': ['pytest']},
+    extras_require={'test': ['hypothesis', 'pytest']},
     entry_points={
         'console_scripts': [
             'panorama_node = panorama_stitch.panorama_node:main',

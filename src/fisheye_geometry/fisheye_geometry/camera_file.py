@@ -1,57 +1,38 @@
-"""ROS camera_info YAML: the file that camera_calibration writes and camera_info_url names."""
+"""Calibration files: camera_info YAML as ROS writes it, and what else ROS tools leave behind.
 
-from dataclasses import dataclass
+Beside the file that camera_calibration writes and `camera_info_url` names: its INI form, a message
+of camera_info as `ros2 topic echo` prints it, and OpenCV's FileStorage with the keys of ROS.
+"""
+
 from pathlib import Path
 
-import numpy as np
-
+from fisheye_geometry.calibration_ini import is_ini, parse_ini
+from fisheye_geometry.camera import IDENTITY, Camera, Readout, camera_from
 from fisheye_geometry.errors import CalibrationError, CameraFileError
-from fisheye_geometry.lens import Lens, make_lens
-from fisheye_geometry.yaml_file import is_number, read_mapping, shown, write_mapping
+from fisheye_geometry.lens import make_lens
+from fisheye_geometry.plain_yaml import Mapping, parse_mapping
+from fisheye_geometry.yaml_file import is_number, read_text, shown, write_mapping
 
-_IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+__all__ = ['Camera', 'read_camera', 'write_camera']
 
-
-@dataclass(frozen=True)
-class Camera:
-    """A named, calibrated camera.
-
-    Attributes
-    ----------
-    name
-        The camera's name, '' where the file has none.
-    lens
-        What it sees.
-    rectification
-        R of camera_info, nine numbers in row order.
-    projection
-        P of camera_info, twelve numbers in row order; () for K beside a column of zeros.
-    """
-
-    name: str
-    lens: Lens
-    rectification: tuple[float, ...] = _IDENTITY
-    projection: tuple[float, ...] = ()
-
-    def misfit(self, width: int, height: int) -> str:
-        """Say why pictures of a size, px, cannot be of this camera; '' if they can."""
-        if (self.lens.width, self.lens.height) == (width, height):
-            return ''
-        return (
-            f'the calibration is for {self.lens.width}x{self.lens.height} px; '
-            f'the pictures have {width}x{height} px'
-        )
-
-    @property
-    def projection_matrix(self) -> np.ndarray:
-        """P of camera_info, (3, 4) float64."""
-        if self.projection:
-            return np.array(self.projection).reshape(3, 4)
-        return np.hstack([self.lens.matrix, np.zeros((3, 1))])
+_MATRICES = {
+    'k': 'camera_matrix',
+    'd': 'distortion_coefficients',
+    'r': 'rectification_matrix',
+    'p': 'projection_matrix',
+}
+_KEYS = {
+    'width': 'image_width',
+    'height': 'image_height',
+    **_MATRICES,
+    **{key.upper(): name for key, name in _MATRICES.items()},
+}
+"""Fields of a CameraInfo message (in capitals: of ROS 1), by the file's keys for them."""
+_COEFFICIENTS = {0, 4, 5, 8, 12, 14}
 
 
 def read_camera(path: str | Path) -> Camera:
-    """Read a camera_info YAML file.
+    """Read a calibration file.
 
     Raises
     ------
@@ -59,18 +40,9 @@ def read_camera(path: str | Path) -> Camera:
         If the file cannot be read, lacks something, or describes no possible camera; the
         sentence names the file, the key, the value and what was expected.
     """
-    entries = read_mapping(path)
+    text = read_text(path)
     try:
-        size = [_integer(entries, key) for key in ('image_width', 'image_height')]
-        matrix = _numbers(entries, 'camera_matrix', {9})
-        distortion = _numbers(entries, 'distortion_coefficients', {0, 4, 5, 8})
-        lens = make_lens(_text(entries, 'distortion_model'), *size, matrix, distortion)
-        return Camera(
-            name=_text(entries, 'camera_name'),
-            lens=lens,
-            rectification=_numbers(entries, 'rectification_matrix', {9}, _IDENTITY),
-            projection=_numbers(entries, 'projection_matrix', {12}, ()),
-        )
+        return _camera(parse_ini(text) if is_ini(text) else parse_mapping(text))
     except (CalibrationError, CameraFileError) as error:
         raise CameraFileError(f'{path}: {error}') from error
 
@@ -81,8 +53,10 @@ def write_camera(path: str | Path, camera: Camera) -> None:
     Raises
     ------
     CameraFileError
-        If the file cannot be written.
+        If the file cannot be written, or its name says that it is an INI file.
     """
+    if Path(path).suffix.lower() == '.ini':
+        raise CameraFileError(f'{path} cannot be written as INI; expected a name with .yaml')
     lens = camera.lens
     write_mapping(
         path,
@@ -103,35 +77,104 @@ def _matrix(rows: int, cols: int, data) -> dict:
     return {'rows': rows, 'cols': cols, 'data': [float(value) for value in data]}
 
 
-def _integer(entries: dict, key: str) -> int:
-    value = entries.get(key)
-    if type(value) is not int or not is_number(value):
-        raise CameraFileError(f'{key} is {shown(value)}; expected a whole number of pixels')
+def _camera(entries: Mapping) -> Camera:
+    _refuse_kalibr(entries)
+    if 'image_width' not in entries and 'width' in entries:
+        entries = _of_message(entries)
+    size = [_integer(entries, key) for key in ('image_width', 'image_height')]
+    matrix = _numbers(entries, 'camera_matrix', {9})
+    distortion = _numbers(entries, 'distortion_coefficients', _COEFFICIENTS)
+    lens = make_lens(_model(entries), *size, matrix, distortion)
+    rectification = _numbers(entries, 'rectification_matrix', {9}, IDENTITY)
+    projection = _numbers(entries, 'projection_matrix', {12}, ())
+    camera = camera_from(_text(entries, 'camera_name'), lens, rectification, projection)
+    return _readout(entries).of(camera)
+
+
+def _refuse_kalibr(entries: Mapping) -> None:
+    first = next(iter(entries.values()), None)
+    if isinstance(first, Mapping) and 'intrinsics' in first:
+        raise CameraFileError(
+            'it is a camchain of Kalibr; expected a camera_info file for each camera: '
+            'image_width, image_height, camera_matrix (fx, 0, cx, 0, fy, cy, 0, 0, 1 of '
+            'intrinsics), distortion_model, distortion_coefficients'
+        )
+
+
+def _of_message(fields: Mapping) -> Mapping:
+    """Return the entries that a message of camera_info says, by the keys of a file."""
+    entries = Mapping()
+    for field, value in fields.items():
+        key = _KEYS.get(field, field)
+        entries[key] = {'data': value} if field.lower() in _MATRICES else value
+        entries.lines[key] = fields.lines[field]
+        if field in fields.texts:
+            entries.texts[key] = fields.texts[field]
+    return entries
+
+
+def _readout(entries: Mapping) -> Readout:
+    """Return the part of the sensor that an echoed message names; all of it of a file."""
+    roi = entries.get('roi', Mapping())
+    if not isinstance(roi, Mapping):
+        raise CameraFileError(f'{entries.at("roi")}roi is {shown(roi)}; expected x_offset: ...')
+    parts = {key: _count(roi, key) for key in ('x_offset', 'y_offset', 'width', 'height')}
+    return Readout(**parts, **{key: _count(entries, key) for key in ('binning_x', 'binning_y')})
+
+
+def _count(entries: Mapping, key: str) -> int:
+    value = _integer(entries, key) if key in entries else 0
+    if value < 0:
+        raise CameraFileError(f'{entries.at(key)}{key} is {value}; expected 0 or more')
     return value
 
 
-def _text(entries: dict, key: str) -> str:
-    value = entries.get(key, '')
-    if isinstance(value, (list, dict)):
-        raise CameraFileError(f'{key} is {shown(value)}; expected text')
-    # A name may look like a number.
-    return value if isinstance(value, str) else shown(value)
+def _integer(entries: Mapping, key: str) -> int:
+    value = entries.get(key)
+    if not is_number(value) or value != int(value):
+        raise CameraFileError(
+            f'{entries.at(key)}{key} is {shown(value)}; expected a whole number of pixels'
+        )
+    return int(value)
 
 
-def _numbers(entries: dict, key: str, counts: set[int], default=None) -> tuple[float, ...]:
+def _model(entries: Mapping) -> str:
+    if 'distortion_model' not in entries and 'camera_model' in entries:
+        raise CameraFileError(
+            f'{entries.at("camera_model")}camera_model is {shown(entries["camera_model"])}, and '
+            'distortion_model is missing; expected distortion_model: equidistant (of a fisheye '
+            'lens), plumb_bob or rational_polynomial'
+        )
+    return _text(entries, 'distortion_model')
+
+
+def _text(entries: Mapping, key: str) -> str:
+    if key in entries and key not in entries.texts:
+        raise CameraFileError(
+            f'{entries.at(key)}{key} is {shown(entries[key])}; expected text, in quotes if it has '
+            'brackets'
+        )
+    return entries.texts.get(key, '')
+
+
+def _numbers(entries: Mapping, key: str, counts: set[int], default=None) -> tuple[float, ...]:
     """Take `data` of a matrix entry, whose length must be one of `counts`."""
     if key not in entries and default is not None:
         return default
-    entry = entries.get(key)
+    entry, name = entries.get(key), entries.at(key) + key
     data = entry.get('data') if isinstance(entry, dict) else None
     if not isinstance(data, list):
         raise CameraFileError(
-            f'{key} is {shown(entry)}; expected `rows`, `cols` and `data: [...]`'
+            f'{name} is {shown(entry)}; expected `rows`, `cols` and `data: [...]`'
         )
-    if len(data) not in counts:
-        expected = ' or '.join(map(str, sorted(counts)))
-        raise CameraFileError(f'{key} has {len(data)} numbers; expected {expected}')
+    if data and all(isinstance(row, list) for row in data):
+        data = [value for row in data for value in row]
     for value in data:
         if not is_number(value):
-            raise CameraFileError(f'{key} holds {shown(value)}; expected finite numbers')
+            raise CameraFileError(
+                f'{name} holds {shown(value)}; expected finite numbers, with commas between them'
+            )
+    if len(data) not in counts:
+        expected = ' or '.join(map(str, sorted(counts)))
+        raise CameraFileError(f'{name} has {len(data)} numbers; expected {expected}')
     return tuple(float(value) for value in data)

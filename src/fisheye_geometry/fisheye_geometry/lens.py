@@ -30,7 +30,8 @@ def make_lens(model: str, width: int, height: int, matrix, distortion) -> Lens:
     matrix
         Camera matrix K, nine numbers in row order or (3, 3), px.
     distortion
-        The model's coefficients.
+        The model's coefficients; zeros behind the four of a fisheye lens, which some drivers
+        send, are left out.
 
     Raises
     ------
@@ -41,9 +42,13 @@ def make_lens(model: str, width: int, height: int, matrix, distortion) -> Lens:
         raise CalibrationError(
             f"distortion model '{model}' is not known; expected one of {', '.join(_MODELS)}"
         )
+    lens = _MODELS[model]
+    most = max(lens.coefficient_counts)
+    if not any(distortion[most:]):
+        distortion = distortion[:most]
     matrix = np.asarray(matrix, float).reshape(3, 3)
     focal_x, skew, center_x = matrix[0]
-    return _MODELS[model](
+    return lens(
         width=int(width),
         height=int(height),
         focal_x_px=float(focal_x),

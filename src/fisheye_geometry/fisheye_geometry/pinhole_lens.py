@@ -11,7 +11,9 @@ from fisheye_geometry.lens_model import Lens
 class PinholeLens(Lens):
     """Conventional lens with the distortion of Brown and Conrady (`plumb_bob` and rational).
 
-    The formulas are those of OpenCV's `projectPoints`, which does the forward mapping here.
+    The formulas are those of OpenCV's `projectPoints`, which does the forward mapping here:
+    k1, k2, p1, p2, k3, of the rational form k4, k5, k6 too, then the thin prism's s1 to s4 and
+    the tilt of the sensor, tau_x and tau_y, rad.
 
     References
     ----------
@@ -19,21 +21,31 @@ class PinholeLens(Lens):
     """
 
     model = 'plumb_bob'
-    coefficient_counts = (0, 4, 5, 8)
+    coefficient_counts = (0, 4, 5, 8, 12, 14)
     _STEEPEST = 1.5
     """No plane picture reaches 90 degrees; rad."""
 
     @property
     def ros_model(self) -> str:
         """`distortion_model` of REP-104, which names the rational form apart."""
-        return 'rational_polynomial' if len(self.distortion) == 8 else 'plumb_bob'
+        return 'rational_polynomial' if len(self.distortion) >= 8 else 'plumb_bob'
 
     @cached_property
     def max_angle_rad(self) -> float:
-        """Angle at which the radial distortion folds back, or the image circle's edge, rad."""
+        """Angle at which the distortion folds back somewhere, or the image circle's edge, rad."""
         angles = np.linspace(0.0, self._STEEPEST, 3000)
-        rays = np.stack([np.sin(angles), np.zeros_like(angles), np.cos(angles)], axis=-1)
-        folds = np.flatnonzero(np.diff(self._distort(rays)[:, 0]) <= 0)
+        # Prism and tilt are not the same all around.
+        around = np.linspace(0.0, 2 * np.pi, 8 if len(self.distortion) > 8 else 1, endpoint=False)
+        side = np.sin(angles)[:, None]
+        rays = np.stack(
+            np.broadcast_arrays(
+                side * np.cos(around), side * np.sin(around), np.cos(angles)[:, None]
+            ),
+            axis=-1,
+        )
+        outwards = np.stack([np.cos(around), np.sin(around)], axis=-1)
+        distance = (self._distort(rays) * outwards).sum(axis=-1)
+        folds = np.flatnonzero((np.diff(distance, axis=0) <= 0).any(axis=-1))
         limit = angles[folds[0]] if len(folds) else self._STEEPEST
         return float(min(limit, self.visible_angle_rad))
 

@@ -1,31 +1,23 @@
 """YAML files that people edit: read with precise errors, never written by halves."""
 
-import os
 import sys
-import tempfile
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from fisheye_geometry.errors import CameraFileError
+from fisheye_geometry.plain_yaml import Mapping, parse_mapping
+from fisheye_geometry.regular_file import is_missing, read_regular, replace_regular
 
-_MAX_BYTES = 1_000_000
+__all__ = ['is_missing', 'is_number', 'read_mapping', 'read_text', 'shown', 'write_mapping']
 
-
-def is_missing(path: str | Path) -> bool:
-    """Whether there is no such file; of one that cannot be looked at, `read_mapping` tells."""
-    with suppress(OSError):
-        try:
-            Path(path).stat()
-        except (FileNotFoundError, ValueError):  # no file has a zero byte in its name
-            return True
-    return False
+_MAX_BYTES = 100_000
+"""Many times what a calibration or an overlap takes."""
 
 
-def read_mapping(path: str | Path) -> dict:
-    """Read a YAML file that holds a mapping.
+def read_mapping(path: str | Path) -> Mapping:
+    """Read a YAML file whose first document is a mapping.
 
     Raises
     ------
@@ -33,34 +25,36 @@ def read_mapping(path: str | Path) -> dict:
         If there is no such file, or it is too large, not text, not YAML or not a mapping; the
         sentence names the file and, where there is one, the line.
     """
-    path = Path(path)
+    text = read_text(path)
     try:
-        with path.open('rb') as file:
-            content = file.read(_MAX_BYTES + 1)
+        return parse_mapping(text)
+    except CameraFileError as error:
+        raise CameraFileError(f'{path}: {error}') from error
+
+
+def read_text(path: str | Path) -> str:
+    """Read a short text file; of a longer one the YAML documents that begin it.
+
+    Raises
+    ------
+    CameraFileError
+        If there is no such file, or it is too large or not text.
+    """
+    try:
+        content = read_regular(path, _MAX_BYTES)
     except OSError as error:
         raise CameraFileError(f'{path} cannot be read: {error.strerror}') from error
     if len(content) > _MAX_BYTES:
-        raise CameraFileError(
-            f'{path} is larger than {_MAX_BYTES} bytes; expected a short YAML file'
-        )
+        # A topic that was echoed into a file: its first message is enough.
+        content = content[: content.rfind(b'\n---') + 1]
+        if not content:
+            raise CameraFileError(
+                f'{path} is larger than {_MAX_BYTES} bytes; expected a short YAML file'
+            )
     try:
-        text = content.decode()
-        _refuse_aliases(path, text)
-        mapping = yaml.safe_load(text)
+        return content.decode()
     except UnicodeDecodeError as error:
         raise CameraFileError(f'{path} is not text (byte {error.start})') from error
-    except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark
-        line = f' at line {mark.line + 1}' if mark else ''
-        raise CameraFileError(f'{path} is not valid YAML{line}: {error.problem}') from error
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        reason = str(error).splitlines()[0]
-        raise CameraFileError(f'{path} is not valid YAML: {reason}') from error
-    if not isinstance(mapping, dict):
-        raise CameraFileError(
-            f'{path} holds {type(mapping).__name__}; expected `key: value` lines'
-        )
-    return mapping
 
 
 def is_number(value: Any) -> bool:
@@ -69,21 +63,8 @@ def is_number(value: Any) -> bool:
 
 
 def shown(value: Any) -> str:
-    """Give a value as it may stand in a sentence."""
-    try:
-        return f'{value!r:.80}'
-    except ValueError:
-        return 'a number of too many digits'  # more than Python writes
-
-
-def _refuse_aliases(path: Path, text: str) -> None:
-    """Refuse references within a file, with which a few lines can mean more than fits."""
-    for token in yaml.scan(text):
-        if isinstance(token, yaml.AliasToken):
-            raise CameraFileError(
-                f'{path} refers to `&{token.value}` at line {token.start_mark.line + 1}; '
-                'expected plain values'
-            )
+    """Return a value as it may stand in a sentence."""
+    return f'{value!r:.80}'
 
 
 def write_mapping(path: str | Path, mapping: dict) -> None:
@@ -94,19 +75,8 @@ def write_mapping(path: str | Path, mapping: dict) -> None:
     CameraFileError
         If the file cannot be written.
     """
-    path = Path(path)
     text = yaml.safe_dump(mapping, sort_keys=False, default_flow_style=None, width=100)
-    temporary = None
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        descriptor, temporary = tempfile.mkstemp(dir=path.parent, prefix=f'.{path.name}.')
-        with os.fdopen(descriptor, 'w') as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
+        replace_regular(path, text)
     except OSError as error:
-        if temporary:
-            Path(temporary).unlink(missing_ok=True)
         raise CameraFileError(f'{path} cannot be written: {error.strerror}') from error

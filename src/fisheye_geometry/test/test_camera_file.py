@@ -42,10 +42,16 @@ def test_the_synonym_fisheye_is_written_by_its_ros_name(tmp_path):
         ({'camera_matrix': {'data': [0] * 9}}, 'focal_x_px is 0.0; expected'),
         ({'distortion_coefficients': {'data': [0, 0, 0, float('nan')]}}, 'holds nan; expected'),
         ({'distortion_coefficients': {'data': ['a', 0, 0, 0]}}, "holds 'a'; expected finite"),
-        ({'distortion_coefficients': {'data': [10**400, 0, 0, 0]}}, '0; expected finite numbers'),
+        (
+            {'distortion_coefficients': {'data': [10**400, 0, 0, 0]}},
+            'inf; expected finite',
+        ),
         ({'distortion_model': ['fisheye']}, "distortion_model is .'fisheye'.; expected text"),
         ({'camera_name': {}}, 'camera_name is {}; expected text'),
-        ({'distortion_coefficients': {'data': [0] * 5}}, '5 distortion coefficients; .* has 4'),
+        (
+            {'distortion_coefficients': {'data': [0, 0, 0, 0, 0.1]}},
+            '5 distortion coeff.* has 4',
+        ),
         ({'projection_matrix': {'data': [0]}}, 'projection_matrix has 1 numbers; expected 12'),
     ],
 )
@@ -61,13 +67,13 @@ def test_a_wrong_entry_is_named(tmp_path, change, words):
 @pytest.mark.parametrize(
     ('content', 'words'),
     [
-        (b'', 'holds NoneType; expected'),
-        (b'just text', 'holds str; expected'),
+        (b'', 'it is empty; expected'),
+        (b'just text', 'it holds a single value; expected'),
         (b'a: [1, 2\nb: 3', 'not valid YAML at line 2'),
-        (b'a: !!python/object/apply:os.system ["true"]', 'not valid YAML at line 1'),
+        (b'a: !!python/object/apply:os.system ["true"]', 'line 1: it has the tag'),
         (b'\xff\xfe\x00', 'is not text'),
         (b'a: \x00', 'not valid YAML'),
-        (b'[' * 5000, 'not valid YAML'),
+        (b'[' * 5000, 'line 1: it is more than 20 levels deep'),
         (b'a' * 2_000_000, 'larger than'),
     ],
 )
@@ -86,11 +92,178 @@ def test_a_missing_file_and_an_unwritable_place_are_named(tmp_path):
         write_camera(tmp_path / 'file' / 'camera.yaml', CAMERA)
 
 
-def test_what_a_few_lines_could_blow_up_is_refused(tmp_path):
+K = '[150.0, 0, 319.5, 0, 150.0, 239.5, 0, 0, 1]'
+YAML = f"""
+image_width: 640
+image_height: 480
+camera_name: left
+camera_matrix: {{rows: 3, cols: 3, data: {K}}}
+distortion_model: equidistant
+distortion_coefficients: {{rows: 1, cols: 4, data: [-0.02, 0.004, -0.001, 0.0001]}}
+"""
+LENS = make_lens(
+    'equidistant', 640, 480, [150, 0, 319.5, 0, 150, 239.5, 0, 0, 1], [-0.02, 0.004, -0.001, 1e-4]
+)
+
+
+@pytest.mark.parametrize(
+    ('old', 'new'),
+    [
+        ('0.0001', '1e-04'),
+        ('150.0', '1.5e2'),
+        ('camera_name: left', 'camera_name:\tleft'),
+        ('-0.02, ', '-0.02,\t'),
+        ('0.0001', '0.0001, 0.0'),
+        (K, '[[150, 0, 319.5], [0, 150, 239.5], [0, 0, 1]]'),
+        ('640', '640.0'),
+        ('\n', '\r\n'),
+        ('\nimage_width', '%YAML:1.0\n---\nimage_width'),
+        ('{rows: 3', '!!opencv-matrix {rows: 3'),
+        ('camera_name', 'rest: &id001 [1, 2]\nmore: *id001\ncamera_name'),
+        ('0.0001]}\n', '0.0001]}\n---\n'),
+        ('0.0001]}\n', '0.0001]}\nrectification_matrix: {data: [0, 0, 0, 0, 0, 0, 0, 0, 0]}\n'),
+    ],
+)
+def test_a_file_as_other_tools_write_it(tmp_path, old, new):
     path = tmp_path / 'camera.yaml'
-    path.write_text('image_width: 640\na: &many [1, 2]\ncamera_matrix: [*many, *many]\n')
-    with pytest.raises(CameraFileError, match='refers to `&many` at line 3; expected plain'):
+    assert old in YAML
+    path.write_bytes(YAML.replace(old, new).encode())
+    assert read_camera(path) == Camera('left', LENS)
+
+
+@pytest.mark.parametrize('name', ['0123', '1e5', 'true', '1.50', "'[19092272]'", '"a: b"'])
+def test_a_name_is_the_text_that_stands_there(tmp_path, name):
+    path = tmp_path / 'camera.yaml'
+    path.write_text(YAML.replace('left', name))
+    assert read_camera(path).name == name.strip('"\'')
+
+
+@pytest.mark.parametrize(
+    ('old', 'new', 'words'),
+    [
+        ('-0.02, 0.004, -0.001, 0.0001', '-0.02 0.004 -0.001 0.0001', 'with commas between them'),
+        (
+            'name: left',
+            'name: [1909]',
+            r'line 4: camera_name is \[1909\]; .*in quotes',
+        ),
+        ('distortion_model: eq', 'camera_model: eq', 'line 6: camera_model is .*: equidistant'),
+        ('camera_matrix: {', 'camera_matrix:\n\tdata: {', 'line 6: a tab indents'),
+        ('640', '640.5', 'line 2: image_width is 640.5; expected a whole number'),
+        ('0.0001', '0.0001, 0.1', '5 distortion coefficients'),
+    ],
+)
+def test_what_cannot_be_meant_is_named_with_its_line(tmp_path, old, new, words):
+    path = tmp_path / 'camera.yaml'
+    path.write_text(YAML.replace(old, new))
+    with pytest.raises(CameraFileError, match=words):
         read_camera(path)
-    path.write_text(f'image_width: 0x{"f" * 5000}')
-    with pytest.raises(CameraFileError, match=r'image_width is .*; expected a whole number'):
+
+
+def test_a_camchain_of_kalibr_is_told_from_a_camera(tmp_path):
+    path = tmp_path / 'camchain.yaml'
+    path.write_text('cam0:\n  intrinsics: [150, 150, 319.5, 239.5]\n  resolution: [640, 480]\n')
+    with pytest.raises(CameraFileError, match='camchain of Kalibr; expected a camera_info file'):
         read_camera(path)
+
+
+ECHO = """header:
+  frame_id: left
+height: 480
+width: 640
+distortion_model: equidistant
+d:
+- -0.02
+- 0.004
+- -0.001
+- 0.0001
+k: [150.0, 0, 319.5, 0, 150.0, 239.5, 0, 0, 1]
+binning_x: 0
+binning_y: 0
+roi:
+  x_offset: 0
+  y_offset: 0
+  height: 0
+  width: 0
+  do_rectify: false
+---
+"""
+
+
+def test_a_message_that_was_echoed_into_a_file(tmp_path):
+    path = tmp_path / 'echo.yaml'
+    for text in (ECHO, ECHO * 3, ECHO * 1000, ECHO.replace('\nd:', '\nD:').replace('k:', 'K:')):
+        path.write_text(text)
+        assert read_camera(path) == Camera('', LENS)
+    path.write_text(ECHO.replace('binning_x: 0', 'binning_x: 2').replace('ing_y: 0', 'ing_y: 2'))
+    assert read_camera(path).lens.width == 320
+    path.write_text(ECHO.replace('x_offset: 0', 'x_offset: -1'))
+    with pytest.raises(CameraFileError, match='line 15: x_offset is -1; expected 0 or more'):
+        read_camera(path)
+
+
+INI = """# oST version 5.0 parameters
+
+[image]
+
+width
+640
+
+height
+480
+
+[narrow]
+
+camera matrix
+600.5 0 319.5
+0 600.25 239.5
+0 0 1
+
+distortion
+-0.3 0.1 1e-03 0.002 -0.01
+
+rectification
+1 0 0
+0 1 0
+0 0 1
+
+projection
+600 0 319.5 0
+0 600 239.5 0
+0 0 1 0
+"""
+
+
+@pytest.mark.parametrize('name', ['ost.txt', 'narrow.ini'])
+def test_an_ini_file(tmp_path, name):
+    path = tmp_path / name
+    path.write_text(INI)
+    camera = read_camera(path)
+    matrix = [600.5, 0, 319.5, 0, 600.25, 239.5, 0, 0, 1]
+    assert camera.name == 'narrow'
+    assert camera.lens == make_lens('plumb_bob', 640, 480, matrix, [-0.3, 0.1, 1e-3, 0.002, -0.01])
+    assert camera.projection[:4] == (600, 0, 319.5, 0)
+    path.write_text(INI.replace('-0.01\n', '-0.01 0.5 0.25 0.125\n'))
+    assert read_camera(path).lens.ros_model == 'rational_polynomial'
+
+
+@pytest.mark.parametrize(
+    ('old', 'new', 'words'),
+    [
+        ('-0.01\n', '\n', 'line 18: distortion has 4 numbers; in an INI file 5 mean plumb_bob'),
+        ('640', 'wide 640', 'image_width is None; expected'),
+        ('0 0 1\n\ndist', '0 0\n\ndist', 'line 13: camera_matrix has 8 numbers; expected 9'),
+        ('600.25', '6OO', "line 15: '6OO' is no number"),
+        ('319.5 0\n', 'nan 0\n', 'holds nan; expected finite numbers'),
+    ],
+)
+def test_an_ini_file_that_is_broken_is_refused_with_its_line(tmp_path, old, new, words):
+    path = tmp_path / 'ost.txt'
+    path.write_text(INI.replace(old, new, 1))
+    with pytest.raises(CameraFileError, match=words):
+        read_camera(path)
+
+
+def test_nothing_but_yaml_is_written(tmp_path):
+    with pytest.raises(CameraFileError, match=r'cannot be written as INI; expected .* \.yaml'):
+        write_camera(tmp_path / 'left.ini', CAMERA)

@@ -33,6 +33,20 @@ RATIONAL = make_lens(
     [400, 0, 320, 0, 400, 240, 0, 0, 1],
     [0.5, 0.1, 0.001, 0, 0.01, 0.8, 0.2, 0.02],
 )
+PRISM = make_lens(
+    'rational_polynomial',
+    640,
+    480,
+    [400, 0, 320, 0, 410, 240, 0, 0, 1],
+    [-0.3, 0.1, 0.001, -0.002, -0.01, 0.02, 0.01, 0.001, 0.01, -0.004, 0.006, 0.003],
+)
+TILTED = make_lens(
+    'rational_polynomial',
+    640,
+    480,
+    [400, 0, 320, 0, 410, 240, 0, 0, 1],
+    [*PRISM.distortion, 0.06, -0.04],
+)
 PLAIN = make_lens('plumb_bob', 640, 480, [400, 0, 320, 0, 400, 240, 0, 0, 1], [])
 
 
@@ -42,7 +56,7 @@ def pixels_around(lens):
     return np.stack(np.meshgrid(x, y), axis=-1)
 
 
-@pytest.mark.parametrize('lens', [FISHEYE, FOLDING, PINHOLE, RATIONAL, PLAIN])
+@pytest.mark.parametrize('lens', [FISHEYE, FOLDING, PINHOLE, RATIONAL, PRISM, TILTED, PLAIN])
 def test_a_pixel_comes_back_from_its_ray(lens):
     pixels = pixels_around(lens)
     rays, seen = lens.unproject(pixels)
@@ -85,6 +99,48 @@ def test_a_ray_behind_the_camera_is_not_mirrored_into_the_picture():
     assert pixel[0] > FISHEYE.width
 
 
+def test_prism_and_tilt_are_those_of_the_formula():
+    k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, tau_x, tau_y = TILTED.distortion
+    rays = np.random.default_rng(2).uniform((-0.5, -0.5, 0.5), (0.5, 0.5, 1.5), (40, 3))
+    x, y = (rays[:, :2] / rays[:, 2:]).T
+    r2 = x * x + y * y
+    radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
+    u = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x) + s1 * r2 + s2 * r2 * r2
+    v = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y + s3 * r2 + s4 * r2 * r2
+    for lens, tilt_x, tilt_y in ((PRISM, 0.0, 0.0), (TILTED, tau_x, tau_y)):
+        (cx, sx), (cy, sy) = ((np.cos(t), np.sin(t)) for t in (tilt_x, tilt_y))
+        rotation = np.array([[cy, 0, -sy], [0, 1, 0], [sy, 0, cy]]) @ np.array(
+            [[1, 0, 0], [0, cx, sx], [0, -sx, cx]]
+        )
+        onto_sensor = np.array(
+            [
+                [rotation[2, 2], 0, -rotation[0, 2]],
+                [0, rotation[2, 2], -rotation[1, 2]],
+                [0, 0, 1],
+            ]
+        )
+        tilted = onto_sensor @ rotation @ np.stack([u, v, np.ones_like(u)])
+        expected = np.stack([400 * tilted[0] / tilted[2] + 320, 410 * tilted[1] / tilted[2] + 240])
+        np.testing.assert_allclose(lens.project(rays)[0], expected.T, atol=EXACT_PX)
+
+
+def test_coefficients_of_nothing_are_nothing():
+    matrix = PINHOLE.matrix
+    lenses = [
+        make_lens('rational_polynomial', 640, 480, matrix, [*PINHOLE.distortion, *zeros])
+        for zeros in ([], [0] * 3, [0] * 7, [0] * 9)
+    ]
+    pixels = [lens.unproject(pixels_around(lens))[0] for lens in lenses]
+    for others in pixels[1:]:
+        np.testing.assert_allclose(others, pixels[0], atol=1e-12)
+    assert [lens.ros_model for lens in lenses] == ['plumb_bob', *['rational_polynomial'] * 3]
+
+
+def test_a_fifth_zero_of_a_fisheye_driver_is_left_out():
+    again = make_lens('equidistant', 640, 480, FISHEYE.matrix, [*FISHEYE.distortion, 0.0])
+    assert again == FISHEYE
+
+
 def test_the_image_circle_limits_what_is_seen():
     lens = FISHEYE.seen_within(np.radians(60))
     _, seen = lens.project(
@@ -112,6 +168,7 @@ def test_the_field_of_view_across_the_picture():
         ),
         ({'matrix': [1e300, 0, 1, 0, 1e300, 1, 0, 0, 1]}, r'1e\+300; expected a .*up to 1e\+06'),
         ({'distortion': [0.1, 0.2]}, '2 distortion coefficients; .*equidistant.* has 4'),
+        ({'distortion': [0, 0, 0, 0, 0.1]}, '5 distortion coefficients; .*equidistant.* has 4'),
         ({'distortion': [0.1, 0.2, float('nan'), 0]}, 'finite numbers .*; found nan'),
     ],
 )

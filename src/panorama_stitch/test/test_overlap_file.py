@@ -1,9 +1,12 @@
+import os
 import re
 from dataclasses import replace
 from math import radians
 
 import pytest
 import yaml
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from fisheye_geometry.errors import CameraFileError
 from fisheye_geometry.remap import Turn
@@ -133,3 +136,46 @@ def test_what_no_rig_can_have_is_refused(path):
         path.write_text(re.sub(f'{key}: [^,}}]*', f'{key}: {value}', good, count=1))
         with pytest.raises(CameraFileError, match=f'{key} of .*; expected a finite number up to'):
             read_overlaps(path, CAMERAS, SURFACES)
+
+
+@settings(max_examples=500, deadline=None, suppress_health_check=list(HealthCheck))
+@given(
+    at=st.integers(0, 1500),
+    count=st.integers(0, 40),
+    piece=st.sampled_from(
+        [
+            '!!bool ',
+            '!!int ""',
+            '&a ',
+            '*a',
+            '"\\UFFFFFFFF"',
+            '[' * 99,
+            '1e999',
+            '\t',
+            '- {',
+            '0: ',
+        ]
+    )
+    | st.text(max_size=3),
+)
+def test_a_file_that_was_changed_anyhow_is_read_or_refused(path, at, count, piece):
+    good = path.read_text()
+    changed = path.with_name('changed.yaml')
+    changed.write_text(good[:at] + piece + good[at + count :], encoding='utf-8')
+    try:
+        overlaps = read_overlaps(changed, CAMERAS, SURFACES)
+    except CameraFileError as error:
+        assert str(changed) in str(error)
+    else:
+        assert [overlap.method for overlap in overlaps] == [FIRST.method, SECOND.method]
+
+
+def test_a_fifo_is_refused_and_a_link_stays(tmp_path, path):
+    os.mkfifo(tmp_path / 'fifo')
+    with pytest.raises(CameraFileError, match='it is a FIFO; expected a regular file'):
+        read_overlaps(tmp_path / 'fifo', CAMERAS, SURFACES)
+    link = tmp_path / 'link.yaml'
+    link.symlink_to(path)
+    write_overlaps(link, CAMERAS[:2], SURFACES[:2], [FIRST])
+    assert link.is_symlink()
+    assert len(read_overlaps(path, CAMERAS[:2], SURFACES[:2])) == 1
