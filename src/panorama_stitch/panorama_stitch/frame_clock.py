@@ -1,0 +1,96 @@
+"""The clock of a free-running camera: its stamps without their jitter, and when the next is due."""
+
+from collections import deque
+from itertools import islice
+from statistics import median
+
+_STAMPS = 32
+"""Recent stamps that the clock is read from."""
+_FEWEST = 4
+"""Stamps that make a clock."""
+_LONGEST_GAP = 8
+"""Periods after which a camera counts as started anew."""
+_OFF_BEAT = 0.75
+"""Of the period: what is further off the beat is the frame of another one."""
+_RECENT = 9
+"""Recent gaps whose median shows a changed rate."""
+_OTHER_RATE = 1.5
+"""Factor between the fitted and the usual gap from which the rate has changed."""
+
+
+class FrameClock:
+    """Fits a line through the recent stamps of a camera, lost frames left out.
+
+    Attributes
+    ----------
+    last_ns : int or None
+        The newest stamp; None before the first.
+    jitter_ns : float
+        Mean distance of the stamps from the line.
+    """
+
+    def __init__(self):
+        self.last_ns: int | None = None
+        self._stamps: deque[int] = deque(maxlen=_STAMPS)
+        self._beats: deque[int] = deque(maxlen=_STAMPS)
+        self._period_ns: float | None = None
+        self._behind_ns = 0.0
+        self.jitter_ns = 0.0
+
+    def tick(self, stamp_ns: int) -> float:
+        """Take the stamp of the next frame; return it without its jitter, ns."""
+        beats = self._beats_since_last(stamp_ns)
+        if beats is None:
+            self._stamps.clear()
+            self._beats.clear()
+        self._beats.append(self._beats[-1] + beats if self._beats else 0)
+        self._stamps.append(stamp_ns)
+        self.last_ns = stamp_ns
+        self._read()
+        return self._smooth_ns
+
+    def due_ns(self, when_ns: float) -> float | None:
+        """Return when the frame is due that will lie nearest to a time, ns; None if unknown."""
+        if self._period_ns is None:
+            return None
+        periods = max(1, round((when_ns - self._smooth_ns) / self._period_ns))
+        return self._smooth_ns + periods * self._period_ns
+
+    @property
+    def _smooth_ns(self) -> float:
+        return self.last_ns + self._behind_ns
+
+    def _beats_since_last(self, stamp_ns: int) -> int | None:
+        """Count the periods since the last frame; None where the count starts anew."""
+        if self.last_ns is None or stamp_ns <= self.last_ns:
+            return None
+        if self._period_ns is None:
+            return 1
+        periods = (stamp_ns - self._smooth_ns) / self._period_ns
+        if periods > _LONGEST_GAP:
+            return None
+        # Jitter is more usual than a frame that was lost.
+        usual = _OFF_BEAT + 2 * self.jitter_ns / self._period_ns
+        return 1 if abs(periods - 1) < usual else max(0, round(periods))
+
+    def _read(self) -> None:
+        """Fit the line: the period, and where on it the newest stamp lies."""
+        self._period_ns, self._behind_ns, self.jitter_ns = None, 0.0, 0.0
+        if len(self._stamps) < _FEWEST:
+            return
+        # Relative to the newest, because nanoseconds since 1970 do not fit a float.
+        times = [stamp - self.last_ns for stamp in self._stamps]
+        mean_beat, mean_time = sum(self._beats) / len(times), sum(times) / len(times)
+        apart = [beat - mean_beat for beat in self._beats]
+        spread = sum(a * a for a in apart)
+        period = sum(a * t for a, t in zip(apart, times, strict=True)) / max(spread, 1.0)
+        recent = times[-_RECENT - 1 :]
+        usual = median(b - a for a, b in zip(recent, islice(recent, 1, None), strict=False))
+        if not usual / _OTHER_RATE < period < usual * _OTHER_RATE:
+            self._stamps.clear()
+            self._beats.clear()
+            return
+        self._period_ns = period
+        self._behind_ns = mean_time + period * apart[-1]
+        misses = (abs(t - mean_time - period * a) for a, t in zip(apart, times, strict=True))
+        self.jitter_ns = sum(misses) / len(times)
