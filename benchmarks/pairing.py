@@ -1,7 +1,7 @@
 """Free-running cameras paired by their stamps: rate, worst gap and skew.
 
-Each line is the worst of ten phases (and of two draws of the jitter), over 20 s each. Prints the
-table of docs/stitch.md.
+Each line is the worst of ten phases and of two draws of the jitter (evenly distributed), over 20 s
+each; frames are those of the slowest camera. Prints the table of docs/stitch.md.
 """
 
 from collections.abc import Iterator, Sequence

@@ -1,8 +1,10 @@
-"""The clock of a free-running camera: its stamps without their jitter, and when the next is due."""
+"""The clock of a free-running camera: stamps without their jitter, and when the next is due."""
 
 from collections import deque
-from itertools import islice
+from collections.abc import Sequence
+from itertools import accumulate, pairwise
 from statistics import median
+from typing import NamedTuple
 
 _STAMPS = 32
 """Recent stamps that the clock is read from."""
@@ -12,6 +14,8 @@ _LONGEST_GAP = 8
 """Periods after which a camera counts as started anew."""
 _OFF_BEAT = 0.75
 """Of the period: what is further off the beat is the frame of another one."""
+_DOUBTFUL = 0.1
+"""Of the period: with more jitter the beats may have been counted wrong."""
 _RECENT = 9
 """Recent gaps whose median shows a changed rate."""
 _OTHER_RATE = 1.5
@@ -26,7 +30,7 @@ class FrameClock:
     last_ns : int or None
         The newest stamp; None before the first.
     jitter_ns : float
-        Mean distance of the stamps from the line.
+        Usual distance of the stamps from the line.
     """
 
     def __init__(self):
@@ -80,17 +84,37 @@ class FrameClock:
             return
         # Relative to the newest, because nanoseconds since 1970 do not fit a float.
         times = [stamp - self.last_ns for stamp in self._stamps]
-        mean_beat, mean_time = sum(self._beats) / len(times), sum(times) / len(times)
-        apart = [beat - mean_beat for beat in self._beats]
-        spread = sum(a * a for a in apart)
-        period = sum(a * t for a, t in zip(apart, times, strict=True)) / max(spread, 1.0)
-        recent = times[-_RECENT - 1 :]
-        usual = median(b - a for a, b in zip(recent, islice(recent, 1, None), strict=False))
-        if not usual / _OTHER_RATE < period < usual * _OTHER_RATE:
+        gaps = [later - former for former, later in pairwise(times)]
+        line = _fit(self._beats, times)
+        if line.jitter > _DOUBTFUL * line.period:
+            usual = median(gaps)
+            counted = accumulate((max(1, round(gap / usual)) for gap in gaps), initial=0)
+            beats = deque(counted, maxlen=_STAMPS)
+            other = _fit(beats, times)
+            if other.jitter < _DOUBTFUL / 2 * other.period:
+                self._beats, line = beats, other
+        usual = median(gaps[-_RECENT:])
+        if not usual / _OTHER_RATE < line.period < usual * _OTHER_RATE:
             self._stamps.clear()
             self._beats.clear()
             return
-        self._period_ns = period
-        self._behind_ns = mean_time + period * apart[-1]
-        misses = (abs(t - mean_time - period * a) for a, t in zip(apart, times, strict=True))
-        self.jitter_ns = sum(misses) / len(times)
+        self._period_ns, self._behind_ns, self.jitter_ns = line
+
+
+class _Line(NamedTuple):
+    """Stamps against beats: the slope, how far above the last stamp it ends, how far they lie."""
+
+    period: float
+    behind: float
+    jitter: float
+
+
+def _fit(beats: Sequence[int], times: Sequence[int]) -> _Line:
+    """Fit a line by least squares."""
+    mean_beat, mean_time = sum(beats) / len(times), sum(times) / len(times)
+    apart = [beat - mean_beat for beat in beats]
+    spread = sum(a * a for a in apart)
+    period = sum(a * t for a, t in zip(apart, times, strict=True)) / max(spread, 1.0)
+    # The median, so that frames counted on a wrong beat are no jitter.
+    jitter = median(abs(t - mean_time - period * a) for a, t in zip(apart, times, strict=True))
+    return _Line(period, mean_time + period * apart[-1], jitter)

@@ -194,5 +194,5 @@ def test_a_rate_that_changes_is_followed(rates):
             now += 1000 / rate
             left.append(('left', round(now * MS)))
             right.append(('right', round((now + 500 / rate) * MS)))
-    pairing, groups = pair_all(sorted(left + right, key=lambda entry: entry[1]))
+    _, groups = pair_all(sorted(left + right, key=lambda entry: entry[1]))
     assert len(groups) >= len(left) - 3
