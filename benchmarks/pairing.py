@@ -50,9 +50,7 @@ def measure(cameras: Sequence[Camera]) -> list[Paired]:
 
 def main() -> None:
     """Print the table."""
-    print(
-        '| cameras | panoramas a frame of the slowest | longest gap, periods | skew, ms | worst |'
-    )
+    print('| cameras | panoramas for each frame | longest gap, periods | skew, ms | worst, ms |')
     print('| --- | --- | --- | --- | --- |')
     for name, cameras in cases():
         results = measure(cameras)

@@ -1,5 +1,7 @@
 """The pixel encodings that the nodes work in, by the names that ROS gives them."""
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 
@@ -35,6 +37,16 @@ def converted(image: np.ndarray, encoding: str, wanted: str) -> np.ndarray:
     if encoding == wanted:
         return image
     return cv2.cvtColor(image, _CHANGES[encoding, wanted])
+
+
+def alike(images: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Return pictures all in colour if any is, (height, width[, 3]) uint8 as they are otherwise.
+
+    Colour may be in either order: grey has the same in both.
+    """
+    if all(image.ndim == images[0].ndim for image in images):
+        return list(images)
+    return [cv2.cvtColor(i, cv2.COLOR_GRAY2BGR) if i.ndim == 2 else i for i in images]
 
 
 def from_opencv(image: np.ndarray, wanted: str) -> np.ndarray:

@@ -25,7 +25,7 @@ from fisheye_geometry.encodings import converted
 from fisheye_geometry.errors import FisheyeError, SettingError
 from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.compose.stale import write_age
-from panorama_stitch.figures import figures
+from panorama_stitch.figures import figures, latencies, unpaired
 from panorama_stitch.live import LiveStitcher
 from panorama_stitch.overlap_result import Overlap as OverlapResult
 from panorama_stitch.overlap_result import apart_rad
@@ -43,7 +43,7 @@ class PanoramaBase(Node):
         super().__init__(name, **kwargs)
         self._declared = Parameters(self, settings, on_change=self._apply)
         self._buffer: ImageBuffer | None = None
-        self._encoding = ''
+        self._color = ''
         self._handled, self._published, self._rate = 0, 0, Rate()
         self._shedding = Shedding('pairs')
         self._latencies_ms: deque[float] = deque(maxlen=_LATENCIES)
@@ -62,9 +62,11 @@ class PanoramaBase(Node):
         return self._declared.settings
 
     def take(self, camera: str, stamp_ns: int, image: np.ndarray, encoding: str) -> None:
-        """Take a frame of a camera; the first one decides the panorama's encoding."""
-        self._encoding = self._encoding or encoding
-        self.live.take(camera, stamp_ns, converted(image, encoding, self._encoding))
+        """Take a frame of a camera; the first one in colour decides the order of the channels."""
+        if encoding != 'mono8':
+            self._color = self._color or encoding
+            image = converted(image, encoding, self._color)
+        self.live.take(camera, stamp_ns, image)
 
     def destroy_node(self) -> None:
         """End the threads too."""
@@ -85,7 +87,8 @@ class PanoramaBase(Node):
         if not self._image.wanted:
             return
         surface = compositor.layout.surface
-        size = surface.width, surface.height, self._encoding
+        encoding = 'mono8' if images[0].ndim == 2 else self._color
+        size = surface.width, surface.height, encoding
         if self._buffer is None or not self._buffer.fits(*size):
             self._buffer = ImageBuffer(*size)
         compositor.compose(images, self._buffer.array, are_live=not ages_s)
@@ -143,27 +146,18 @@ class PanoramaBase(Node):
         if not all(result.found for result in live.overlaps):
             report.add(WARN, 'no overlap: frames are side by side')
         if live.unpaired_s > self.settings.stale_after_s:
-            report.add(
-                ERROR,
-                f'pictures come, but for {live.unpaired_s:.0f} s none that belong together: '
-                f'the stamps of the cameras are {live.pairing.spread_ns / 1e9:.3g} s apart '
-                f'(max_pair_skew_s is {self.settings.max_pair_skew_s:g}); are their clocks equal?',
-            )
+            report.add(ERROR, unpaired(live, self.settings))
         ages_s = live.ages_s()
         all_stale = len(ages_s) == len(self.settings.cameras)
         for camera, age_s in ages_s.items():
             report.add(ERROR if all_stale else WARN, f'{camera}: no picture for {age_s:.0f} s')
         if not ages_s:
-            # What only one camera has too many of comes from its rate, not from this machine.
-            shed = live.dropped + min(live.pairing.unpaired.values())
-            self._shedding.tell(report, self._handled, shed)
+            # Frames without a partner are not shed: what they lack is another camera's.
+            self._shedding.tell(report, self._handled, live.dropped)
         report.values['rate Hz'] = self._rate.hz
         report.values['panoramas published'] = self._published
         report.values.update(figures(live))
-        if self._latencies_ms:
-            for share in (50, 95, 99):
-                value = float(np.percentile(self._latencies_ms, share))
-                report.values[f'latency p{share} ms'] = value
+        report.values.update(latencies(self._latencies_ms))
 
 
 def _header(stamp_ns: int) -> Header:

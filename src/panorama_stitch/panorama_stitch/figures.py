@@ -1,10 +1,16 @@
-"""What a live line tells of itself in numbers."""
+"""What a live line tells of itself in numbers, and of clocks that differ in words."""
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
 
 from panorama_stitch.live import LiveStitcher
+from panorama_stitch.settings import PanoramaOutputSettings
+
+_PERCENTILES = (50, 95, 99)
+_LONGEST_LATENCY_MS = 10_000.0
+"""What is older was not taken by the clock of this machine."""
 
 
 def figures(live: LiveStitcher) -> dict[str, float | str]:
@@ -17,7 +23,7 @@ def figures(live: LiveStitcher) -> dict[str, float | str]:
     for camera in cameras:
         values[f'{camera} rate Hz'] = live.rates[camera].hz
         values[f'{camera} unpaired'] = live.pairing.unpaired[camera]
-    skews_ms = np.array(live.pairing.skews_ns) / 1e6
+    skews_ms = np.array(list(live.pairing.skews_ns)) / 1e6
     if len(skews_ms):
         values['skew median ms'] = float(np.median(skews_ms))
         values['skew worst ms'] = float(skews_ms.max())
@@ -27,3 +33,40 @@ def figures(live: LiveStitcher) -> dict[str, float | str]:
         values[f'{pair} offset px'] = overlap.offset_x_px
         values[f'{pair} confidence'] = overlap.confidence
     return values
+
+
+def latencies(latencies_ms: Sequence[float]) -> dict[str, float | str]:
+    """Return percentiles of the latency, or that the clocks differ where none can be known.
+
+    Parameters
+    ----------
+    latencies_ms
+        From the stamp of each recent panorama to its publishing, ms.
+    """
+    latencies_ms = list(latencies_ms)
+    if not latencies_ms:
+        return {}
+    usual_ms = float(np.median(latencies_ms))
+    if 0 <= usual_ms <= _LONGEST_LATENCY_MS:
+        values = np.percentile(latencies_ms, _PERCENTILES)
+        return {
+            f'latency p{percent} ms': float(value)
+            for percent, value in zip(_PERCENTILES, values, strict=True)
+        }
+    apart = f'{abs(usual_ms) / 1e3:.3g} s {"ahead of" if usual_ms < 0 else "behind"}'
+    return {'latency': f"not known: the stamps are {apart} this machine's clock"}
+
+
+def unpaired(live: LiveStitcher, settings: PanoramaOutputSettings) -> str:
+    """Say that no frames belong together, and what is known of the cause."""
+    sentence = f'pictures come, but for {live.unpaired_s:.0f} s none that belong together'
+    spread_s = live.pairing.spread_ns / 1e9
+    if spread_s <= settings.max_pair_skew_s:
+        return sentence
+    limit = f'(max_pair_skew_s is {settings.max_pair_skew_s:g})'
+    if settings.pair_by == 'arrival':
+        return f'{sentence}: they arrive {spread_s:.3g} s apart {limit}'
+    return (
+        f'{sentence}: the stamps of the cameras are {spread_s:.3g} s apart {limit}; are their '
+        'clocks equal? If they cannot be, pair_by:=arrival joins what arrives together'
+    )

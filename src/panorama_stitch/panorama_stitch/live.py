@@ -3,13 +3,14 @@
 from collections.abc import Callable
 from concurrent.futures import Future
 from threading import Lock
-from time import monotonic
+from time import monotonic, monotonic_ns
 from typing import NamedTuple
 
 import numpy as np
 
 from fisheye_capture.newest import Newest
 from fisheye_capture.rate import Rate
+from fisheye_geometry.encodings import alike
 from fisheye_geometry.errors import FisheyeError
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.surface import Surface
@@ -23,6 +24,13 @@ from panorama_stitch.stitcher import Stitcher
 
 _WAITING = 2
 """Groups that may wait to be composed: a moment without the processor loses none."""
+
+
+class _Frame(NamedTuple):
+    """A picture that waits for its partner, and when it was taken."""
+
+    image: np.ndarray
+    stamp_ns: int
 
 
 class _Last(NamedTuple):
@@ -90,6 +98,7 @@ class LiveStitcher:
         self._lock = Lock()
         self._last = {camera: _Last(None, monotonic()) for camera in settings.cameras}
         self._paired_s = monotonic()
+        self._dimensions = 0
         self._dark: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         self._composing = Newest(self._compose, 'compose', _WAITING)
 
@@ -141,11 +150,14 @@ class LiveStitcher:
         self.rates[camera].count()
         with self._lock:
             self._last[camera] = _Last(image, monotonic())
-            pair = self.pairing.add(camera, stamp_ns, image)
+            by_stamp = self._preparation.settings.pair_by == 'stamp'
+            when_ns = stamp_ns if by_stamp else monotonic_ns()
+            pair = self.pairing.add(camera, when_ns, _Frame(image, stamp_ns))
             if pair is not None:
                 self._paired_s = monotonic()
-                images = [member.frame for member in pair]
-                self._composing.put(_Group(images, min(member.stamp_ns for member in pair), {}))
+                frames = [member.frame for member in pair]
+                images, stamps_ns = zip(*frames, strict=True)
+                self._composing.put(_Group(list(images), min(stamps_ns), {}))
             elif ages_s := self.ages_s():
                 self._paired_s = monotonic()
                 self._go_on_without(ages_s, camera, stamp_ns)
@@ -162,8 +174,11 @@ class LiveStitcher:
 
     def apply(self, settings: PanoramaOutputSettings) -> None:
         """Use other settings from the next frames on."""
-        self._preparation.settings = settings
-        self.pairing.max_skew_ns = round(settings.max_pair_skew_s * 1e9)
+        with self._lock:
+            if settings.pair_by != self._preparation.settings.pair_by:
+                self.pairing.clear()
+            self._preparation.settings = settings
+            self.pairing.max_skew_ns = round(settings.max_pair_skew_s * 1e9)
         self._preparation.renew(forget=False)
 
     def calibrate(self, method: str, save: bool) -> Future:
@@ -193,15 +208,22 @@ class LiveStitcher:
             # They may have waited while a camera became another one.
             for camera, image in zip(self.stitcher.cameras, group.images, strict=True):
                 self.stitcher.check(camera, image)
+            images = alike(group.images)
+            if images[0].ndim != self._dimensions:
+                self._dimensions = images[0].ndim
+                self._preparation.renew(forget=True)
             if is_live:
-                self._preparation.remember(group.images, group.stamp_ns)
-            self._preparation.go_on(group.images, group.stamp_ns, is_live=is_live)
+                self._preparation.remember(images, group.stamp_ns)
+            self._preparation.go_on(images, group.stamp_ns, is_live=is_live)
             if self.compositor is None:
                 return
-            images = [
-                self._dimmed(camera, image) if camera in group.ages_s else image
-                for camera, image in zip(self.stitcher.cameras, group.images, strict=True)
-            ]
+            if group.ages_s:
+                images = alike(
+                    [
+                        self._dimmed(camera, image) if camera in group.ages_s else image
+                        for camera, image in zip(self.stitcher.cameras, group.images, strict=True)
+                    ]
+                )
             self._publish(self.compositor, images, group.stamp_ns, group.ages_s)
         except FisheyeError as error:
             self.broken += 1

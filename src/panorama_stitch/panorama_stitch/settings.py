@@ -65,8 +65,15 @@ class PanoramaOutputSettings(OverlapSettings):
         choices=CROPS,
         live=True,
     )
+    pair_by: str = setting(
+        'stamp',
+        'What says which frames belong together: their stamps, or when they arrive, for cameras '
+        'whose clocks differ.',
+        choices=('stamp', 'arrival'),
+        live=True,
+    )
     max_pair_skew_s: float = setting(
-        0.05,
+        0.1,
         'Frames whose stamps differ by more are no pair.',
         minimum=0.0,
         maximum=10.0,

@@ -12,6 +12,7 @@ from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.errors import CameraFileError, ImageFormatError, OverlapError
 from fisheye_geometry.remap import Turn
+from panorama_stitch.figures import unpaired
 from panorama_stitch.live import LiveStitcher
 from panorama_stitch.settings import PanoramaSettings
 
@@ -43,7 +44,7 @@ class Line:
 
     def _publish(self, compositor, images, stamp_ns, ages_s):
         surface = compositor.layout.surface
-        out = np.empty((surface.height, surface.width, 3), np.uint8)
+        out = np.empty((surface.height, surface.width, *images[0].shape[2:]), np.uint8)
         compositor.compose(images, out)
         self.published.append((stamp_ns, out, ages_s))
 
@@ -254,3 +255,42 @@ def test_pictures_that_waited_while_the_lens_changed_stop_nothing(make_line, pic
     count = len(line.published)
     line.feed(shrunk, lambda: len(line.published) > count + 3, 'panoramas of the other lens')
     assert line.live.trouble == ''
+
+
+def test_colour_beside_grey_wins_whoever_comes_first(make_line, pictures):
+    line = make_line(replace(SETTINGS, gain_compensation=False))
+    grey = {name: cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) for name, image in pictures.items()}
+    line.feed({**pictures, 'left': grey['left']}, lambda: line.published, 'a panorama')
+    first = line.published[-1][1]
+    third = first.shape[1] // 3
+    assert np.ptp(first[:, :third], axis=2).max() == 0, 'the left is grey'
+    assert np.ptp(first[:, -third:], axis=2).max() > 50, 'the right is in colour'
+    line.feed(grey, lambda: line.published[-1][1].ndim == 2, 'a grey panorama')
+    line.feed(pictures, lambda: line.published[-1][1].ndim == 3, 'one in colour again')
+    assert line.warnings == []
+
+
+def stamps_apart(line, pictures, seconds, until, what):
+    """Feed frames whose stamps differ by a constant; return the stamp of the left one."""
+    deadline = time.monotonic() + DEADLINE_S
+    while not until():
+        assert time.monotonic() < deadline, what
+        line.stamp_ns += STEP_NS
+        line.live.take('left', line.stamp_ns, pictures['left'])
+        line.live.take('right', line.stamp_ns + round(seconds * 1e9), pictures['right'])
+        line.news.wait(0.01)
+
+
+def test_cameras_of_different_clocks_are_paired_by_arrival(make_line, pictures):
+    line = make_line()
+    apart = (line, pictures, -37.0)
+    end = time.monotonic() + 0.5
+    stamps_apart(*apart, lambda: time.monotonic() > end, 'time for a pair')
+    assert not line.published
+    assert unpaired(line.live, SETTINGS).endswith('pair_by:=arrival joins what arrives together')
+    assert 'the stamps of the cameras are 37 s apart' in unpaired(line.live, SETTINGS)
+    line.live.apply(replace(SETTINGS, pair_by='arrival'))
+    stamps_apart(*apart, lambda: len(line.published) > 5, 'panoramas')
+    assert line.published[-1][0] <= line.stamp_ns - 37 * 10**9, 'the older stamp'
+    line.live.apply(SETTINGS)
+    line.feed(pictures, lambda: line.published[-1][0] > 0, 'pairs by stamp again')

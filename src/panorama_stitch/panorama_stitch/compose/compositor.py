@@ -86,11 +86,13 @@ class Compositor:
         ImageFormatError
             If a picture has not the size that its view was made for.
         """
-        if self.gain and are_live:
-            self.gain.update(images)
+        # Where grey pictures came in place of colour, a gain for them is still to be made.
+        gain = self.gain if self.gain and self.gain.channels == out[0, 0].size else None
+        if gain and are_live:
+            gain.update(images)
         for fade in self._fades:
             fade.expect(out)
-        share([partial(self._draw, parts, images, out) for parts in self._parts])
+        share([partial(self._draw, parts, images, out, gain) for parts in self._parts])
         for fade in self._fades:
             if not fade.is_local:
                 fade.blend(_ALL_ROWS, out)
@@ -103,14 +105,14 @@ class Compositor:
                 cut = view.cut(begin - origin.x_px, rows.start - origin.y_px, *size)
                 parts.append(_Part(index, rows, slice(begin, end), cut))
 
-    def _draw(self, parts: Sequence['_Part'], images: Sequence[np.ndarray], out: np.ndarray):
+    def _draw(self, parts: Sequence['_Part'], images: Sequence[np.ndarray], out, gain):
         for index, rows, columns, cut in parts:
             drawn = out[rows, columns]
             if index:
                 self._fades[index - 1].keep(rows, out)
             cut(images[index], drawn)
-            if self.gain:
-                self.gain.apply(index, drawn)
+            if gain:
+                gain.apply(index, drawn)
             if index and self._fades[index - 1].is_local:
                 self._fades[index - 1].blend(rows, out)
 

@@ -41,11 +41,16 @@ class GainCompensation:
 
     What moves, what one camera shows alone and what is clipped does not count. The factors follow
     the comparisons so slowly that nothing flickers.
+
+    Attributes
+    ----------
+    channels : int
+        Of the pictures that it is for.
     """
 
     def __init__(self, layout: Layout, views: Sequence[View], group: Sequence[np.ndarray]):
         """Prepare, and compare a group of pictures (height, width[, channels]), one a camera."""
-        channels = 1 if group[0].ndim == 2 else group[0].shape[2]
+        self.channels = channels = 1 if group[0].ndim == 2 else group[0].shape[2]
         self._pairs = [_Pair(layout, views, i, channels) for i in range(len(layout.seams))]
         widths = [end - begin for begin, end in map(layout.drawn, range(len(views)))]
         self._multipliers = [_Multiplier(width, channels) for width in widths]

@@ -1,0 +1,101 @@
+"""Free-running cameras through the real stitch node: a panorama for each frame of the slower."""
+
+import random
+import threading
+import time
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+from fisheye_msgs.msg import Projection
+from free_running import Camera
+from rig import SIDES, wait_for
+from sensor_msgs.msg import Image
+from std_msgs.msg import Header
+
+from fisheye_bridge.images import ImageBuffer
+from fisheye_bridge.projection import projection_of
+from fisheye_bridge.qos import IMAGE_INPUT, LATCHED
+from fisheye_bridge.stamps import stamp_of
+from fisheye_geometry.surface import Surface
+
+WATCHED_S = 8.0
+START_S = 40.0
+SETTLED = 30
+"""Frames of each camera before the figures begin."""
+SCHEDULING = 0.1
+"""Share of the frames that a busy machine may lose elsewhere."""
+SURFACE = Surface('cylindrical', 64, 48, 20.0, 31.5, 23.5)
+ENCODINGS = {'left': 'mono8', 'right': 'bgr8'}
+
+
+class Publisher:
+    """Two cameras whose corrected pictures come as they are due, from a thread."""
+
+    def __init__(self, node, cameras):
+        self._node, self._cameras = node, cameras
+        self._end = threading.Event()
+        self.sent_ns = {side: [] for side in SIDES}
+        self._images, self._buffers = {}, {}
+        for side, grey in zip(SIDES, (80, 160), strict=True):
+            self._images[side] = node.create_publisher(Image, f'{side}/image_rect', IMAGE_INPUT)
+            buffer = ImageBuffer(SURFACE.width, SURFACE.height, ENCODINGS[side])
+            buffer.array[:] = grey if buffer.array.ndim == 2 else (grey, 20, 20)
+            self._buffers[side] = buffer
+        self._projections = [
+            node.create_publisher(Projection, f'{side}/projection', LATCHED) for side in SIDES
+        ]
+        for publisher in self._projections:
+            publisher.publish(projection_of(SURFACE, Header()))
+
+    @contextmanager
+    def running(self):
+        thread = threading.Thread(target=self._run)
+        thread.start()
+        try:
+            yield self
+        finally:
+            self._end.set()
+            thread.join()
+
+    def _run(self):
+        chance = random.Random(0)
+        begin_ns = time.time_ns()
+        frames = sorted(
+            (stamp_ms, side)
+            for side, camera in zip(SIDES, self._cameras, strict=True)
+            for stamp_ms in camera.stamps_ms(120.0, chance)
+        )
+        for stamp_ms, side in frames:
+            stamp_ns = begin_ns + round(stamp_ms * 1e6)
+            if self._end.wait(max(0.0, (stamp_ns - time.time_ns()) / 1e9)):
+                return
+            message = self._buffers[side].message
+            message.header.stamp = stamp_of(stamp_ns)
+            self._images[side].publish(message)
+            self.sent_ns[side].append(stamp_ns)
+
+
+@pytest.mark.parametrize(
+    ('rates_hz', 'phase'), [((30, 30), 0.5), ((30, 29.83), 0.0), ((30, 25), 0.3)]
+)
+def test_the_slower_camera_sets_the_rate(rig, watcher, rates_hz, phase):
+    cameras = Camera(rates_hz[0], 0.0, 1.0), Camera(rates_hz[1], phase * 1000 / 30, 1.0)
+    rig.start('stitch', auto_calibrate=False, stale_after_s=5.0)
+    with Publisher(watcher.node, cameras).running() as publisher:
+        wait_for(lambda: rig.check_alive() or watcher.newest, START_S, 'a first panorama')
+        watcher.restart()
+        begin = {side: len(sent) + SETTLED for side, sent in publisher.sent_ns.items()}
+        slow = SIDES[1]
+        due = int(WATCHED_S * rates_hz[1])
+        wait_for(
+            lambda: len(publisher.sent_ns[slow]) > begin[slow] + due, START_S, 'enough frames'
+        )
+    sent = publisher.sent_ns[slow][begin[slow] : begin[slow] + due]
+    period_ns = 1e9 / rates_hz[1]
+    # The panorama has the older stamp of its pair.
+    came = [s for s in watcher.stamps_ns if sent[0] - period_ns < s < sent[-1]]
+    assert came == sorted(set(came)), 'each once, in order'
+    assert len(came) >= due * (1 - SCHEDULING)
+    assert np.median(np.diff(came)) == pytest.approx(period_ns, rel=0.25)
+    assert watcher.newest.encoding == 'bgr8', 'colour beside grey'
