@@ -4,8 +4,11 @@ import math
 import os
 import re
 import shutil
+import subprocess
+import sys
 import threading
 from concurrent.futures import Future
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -16,10 +19,12 @@ from selenium.webdriver import ActionChains, Keys
 
 from fisheye_bridge.projection import surface_of
 from fisheye_geometry.surface import Surface
+from panorama_stitch.viewer_projection import described
 from panorama_stitch.viewer_server import ViewerServer
 from panorama_stitch.viewer_settings import ViewerSettings
 
 DEADLINE_S = 60.0
+ATTACK = Path(__file__).parents[1] / 'src/panorama_stitch/test/attack.py'
 CLOSE_DEG = 1.0
 STRAIGHT_PX = 2.0
 """A line two pixels of the panorama wide, enlarged."""
@@ -94,16 +99,19 @@ class Page:
 @pytest.fixture
 def serve():
     """Give a function that shows one picture over and over, until `stop` is called."""
-    ended = []
+    ended, faults = [], []
 
     def start(surface, image, **settings):
         measured = Future()
         measured.set_result('measured anew')
         server = ViewerServer(
-            ViewerSettings(port=0, **settings), calibrate=lambda: measured, watched=lambda: None
+            ViewerSettings(port=0, **settings),
+            calibrate=lambda: measured,
+            watched=lambda: None,
+            report=lambda sentence, trace: faults.append(trace),
         )
         server.start()
-        server.tell(projection=vars(surface), rate_hz=10.0, delay_ms=20, problems=[])
+        server.tell(projection=described(surface), rate_hz=10.0, delay_ms=20, problems=[])
         jpeg = cv2.imencode('.jpg', image, (cv2.IMWRITE_JPEG_QUALITY, 95))[1].tobytes()
         silent = threading.Event()
 
@@ -125,6 +133,24 @@ def serve():
     yield start
     for end in ended:
         end()
+    assert not faults
+
+
+@pytest.fixture
+def attackers():
+    """Give a function that attacks a port from another address until the test ends."""
+    processes = []
+
+    def run(kind, port):
+        command = [sys.executable, ATTACK, kind, str(port), '127.0.0.2']
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        processes.append(process)
+        process.stdout.readline()  # until all of them are there
+
+    yield run
+    for process in processes:
+        process.kill()
+        process.communicate()
 
 
 def painted(surface, bearing_deg, height_deg):
@@ -239,10 +265,73 @@ def test_a_phone_starts_by_looking_around(browser, serve):
     page.until(turned, 'a turn to the right')
 
 
-def test_the_buttons_ask_for_the_token_where_others_can_look(browser, serve):
-    server = serve(SURFACES[0], painted(SURFACES[0], 0, 0), host='0.0.0.0')
+def elsewhere(server):
+    """Give the address of a page for other machines as this one reaches it, and the token."""
     url, _, token = server.url.partition('#token=')
-    page = Page(browser, f'http://127.0.0.1:{url.split(":")[2]}')
+    return f'http://127.0.0.1:{url.rpartition(":")[2]}', token
+
+
+def test_the_page_asks_for_the_token_before_it_shows_anything(browser, serve):
+    server = serve(SURFACES[0], painted(SURFACES[0], 0, 0), host='0.0.0.0')
+    url, token = elsewhere(server)
+    page = Page(browser, url)
+    for typed in ('guess', 'no (token) at all', token):
+        page.until(lambda: page.find('token').is_displayed(), 'a question')
+        assert 'looking needs the token' in page.text('veil')
+        assert server.watchers == 0
+        page.find('token').send_keys(typed, Keys.ENTER)
+    page.until(lambda: page.text('condition') == 'Live', 'a live picture')
+    page.press('c')
+    page.until(lambda: 'measured anew' in page.text('answer'), 'a calibration')
+
+
+def test_the_address_with_the_token_opens_the_page(browser, serve):
+    server = serve(SURFACES[0], painted(SURFACES[0], 0, 0), host='0.0.0.0')
+    url, token = elsewhere(server)
+    page = Page(browser, f'{url}#token={token}')
+    page.until(lambda: page.text('condition') == 'Live', 'a live picture')
+    assert token not in browser.current_url
+
+
+def test_a_page_that_is_hidden_leaves_its_place(browser, serve):
+    server = serve(SURFACES[0], painted(SURFACES[0], 0, 0))
+    page = Page(browser, server.url)
+    page.until(lambda: page.text('condition') == 'Live', 'a live picture')
+    shown = browser.current_window_handle
+    browser.switch_to.new_window('tab')
+    page.until(lambda: server.watchers == 0, 'the page to leave')
+    browser.close()
+    browser.switch_to.window(shown)
+    page.until(lambda: server.watchers == 1, 'the page to come back')
+
+
+def test_a_surface_that_the_page_does_not_know_is_said(browser, serve):
+    server = serve(SURFACES[0], painted(SURFACES[0], 0, 0))
+    page = Page(browser, server.url)
+    page.until(lambda: page.text('condition') == 'Live', 'a live picture')
+    server.tell(projection={**described(SURFACES[0]), 'surface': 'stereographic'})
+    page.until(lambda: 'cannot show a stereographic panorama' in page.text('problems'), 'words')
+    server.tell(projection=described(SURFACES[0]))
+    page.until(lambda: not page.text('problems'), 'the end of it')
+    page.until(lambda: page.text('condition') == 'Live', 'a live picture')
+
+
+@pytest.mark.parametrize('kind', ['silent', 'idle', 'drawn'])
+def test_the_page_stays_live_under_attack(browser, serve, attackers, kind):
+    server = serve(SURFACES[0], painted(SURFACES[0], 0, 0), host='0.0.0.0', public=True)
+    server.tell(rate_hz=5.0)
+    url, token = elsewhere(server)
+    attackers(kind, int(url.rstrip('/').rpartition(':')[2]))
+    page = Page(browser, f'{url}#token={token}')
+    page.until(lambda: page.text('condition') == 'Live', 'a live picture')
+    # Where this browser does not keep up, its own rate stands beside it.
+    page.until(lambda: page.text('rate') == '5/s', 'the full rate')
+
+
+def test_the_buttons_ask_for_the_token_where_everybody_can_look(browser, serve):
+    server = serve(SURFACES[0], painted(SURFACES[0], 0, 0), host='0.0.0.0', public=True)
+    url, token = elsewhere(server)
+    page = Page(browser, url)
     page.until(lambda: page.text('condition') == 'Live', 'a live picture')
     for typed, answer in (('guess', 'needs the token'), (token, 'measured anew')):
         page.press('c')

@@ -60,7 +60,7 @@ def view(rig: Rig, host: str) -> None:
         START_TIMEOUT_S,
         'the start of the viewer',
     )
-    print(f'Open {address[0]} in a browser. Ctrl-C ends it.', flush=True)
+    print(f'The panorama is at {address[0]} in a browser. Ctrl-C ends it.', flush=True)
     try:
         while True:
             rig.check_alive()

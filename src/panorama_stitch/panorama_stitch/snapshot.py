@@ -16,6 +16,7 @@ import numpy as np
 from fisheye_geometry.errors import SettingError
 from fisheye_geometry.remap import RemapTable
 from fisheye_geometry.surface import Surface
+from panorama_stitch.viewer_projection import described
 
 FORMATS = {'png': '.png', 'gpano': '.jpg'}
 """How a panorama can be saved, and the suffix of the file."""
@@ -70,7 +71,7 @@ def save(path: Path, form: str, image: np.ndarray, surface: Surface, stamp_ns: i
         'image': path.name,
         'stamp_ns': stamp_ns,
         'taken': datetime.fromtimestamp(stamp_ns / 1e9, timezone.utc).isoformat(),
-        'projection': vars(surface),
+        'projection': described(surface),
     }
     text = json.dumps(description, indent=2) + '\n'
     return [
@@ -103,7 +104,7 @@ def gpano(image: np.ndarray, surface: Surface) -> bytes:
 
 
 def on_sphere(surface: Surface) -> tuple[Surface, int, int]:
-    """Give the equirectangular part of the sphere that a panorama covers.
+    """Return the equirectangular part of the sphere that a panorama covers.
 
     Its scale is the panorama's own, rounded so that the sphere is a whole and even number of
     pixels around; bearing 0 is in the middle of the sphere. What a panorama holds beyond 180

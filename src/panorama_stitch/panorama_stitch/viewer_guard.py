@@ -1,7 +1,6 @@
 """Who may ask the viewer's server for what."""
 
 import hmac
-import secrets
 import socket
 from ipaddress import ip_address
 from urllib.parse import urlsplit
@@ -16,28 +15,55 @@ HEADERS = {
 }
 """With every answer: the page loads nothing from elsewhere and nobody frames it."""
 
+SUBPROTOCOL = 'panorama'
+"""What the page's WebSocket speaks."""
+_TOKEN_PROTOCOL = 'token.'
+"""A page can give its WebSocket no header but a second protocol: this, and then the token."""
+
 
 class Guard:
-    """Refuses what other sites could make a browser ask for, and buttons without the token.
+    """Refuses what other sites could make a browser ask for, and who has not the token.
 
     Attributes
     ----------
     token : str
-        What the buttons need; empty where only this machine can look.
+        What looking and the buttons need; empty where only this machine can look.
     """
 
-    def __init__(self, host: str):
-        self.token = '' if _is_loopback(host) else secrets.token_urlsafe(9)
+    def __init__(self, host: str, token: str, is_public: bool):
+        self.token, self._is_public = token, is_public
         name = socket.gethostname().lower()
         self._names = {host.lower(), 'localhost', name, f'{name}.local'}
 
+    def knows(self, request: web.Request) -> bool:
+        """Return whether a request brings the token."""
+        offered = _protocols(request)
+        given = [request.headers.get('X-Token', '')]
+        given += [
+            word.removeprefix(_TOKEN_PROTOCOL)
+            for word in offered
+            if word.startswith(_TOKEN_PROTOCOL)
+        ]
+        token = self.token.encode()
+        return bool(token) and any(
+            hmac.compare_digest(word.encode(errors='replace'), token) for word in given
+        )
+
+    def may_look(self, request: web.Request) -> bool:
+        """Return whether a request may see the picture."""
+        return not self.token or self._is_public or self.knows(request)
+
     def check_token(self, request: web.Request) -> None:
         """Refuse a button pressed without the token."""
-        given = request.headers.get('X-Token', '').encode(errors='replace')
-        if self.token and not hmac.compare_digest(given, self.token.encode()):
+        if self.token and not self.knows(request):
             raise web.HTTPForbidden(
                 text='the button needs the token that was printed when the viewer started'
             )
+
+    def check_protocol(self, request: web.Request) -> None:
+        """Refuse a WebSocket that speaks something else."""
+        if (offered := _protocols(request)) and SUBPROTOCOL not in offered:
+            raise web.HTTPBadRequest(text=f'expected the WebSocket protocol {SUBPROTOCOL}')
 
     @web.middleware
     async def check(self, request: web.Request, handler) -> web.StreamResponse:
@@ -62,8 +88,7 @@ class Guard:
             return False
 
 
-def _is_loopback(host: str) -> bool:
-    try:
-        return host == 'localhost' or ip_address(host).is_loopback
-    except ValueError:
-        return False
+def _protocols(request: web.Request) -> list[str]:
+    """Return the protocols that a WebSocket offers."""
+    header = request.headers.get('Sec-WebSocket-Protocol', '')
+    return [word.strip() for word in header.split(',') if word.strip()]

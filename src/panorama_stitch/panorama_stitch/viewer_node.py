@@ -12,16 +12,18 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from sensor_msgs.msg import CompressedImage
 
-from fisheye_bridge.diagnostics import Diagnostics
+from fisheye_bridge.diagnostics import ERROR, Diagnostics
 from fisheye_bridge.parameters import Parameters
 from fisheye_bridge.projection import surface_of
 from fisheye_bridge.qos import IMAGE_INPUT, LATCHED
 from fisheye_bridge.running import run
 from fisheye_bridge.stamps import ns_of
 from fisheye_geometry.errors import FisheyeError, OverlapError
+from panorama_stitch.viewer_projection import described
 from panorama_stitch.viewer_server import ViewerServer
 from panorama_stitch.viewer_settings import ViewerSettings
 from panorama_stitch.viewer_status import ViewerStatus, measured
+from panorama_stitch.viewer_token import print_on_terminal
 
 _TELL_S = 0.5
 
@@ -34,6 +36,7 @@ class ViewerNode(Node):
         self._declared = Parameters(self, ViewerSettings)
         self._status = ViewerStatus()
         self._image = None
+        self._faults: list[str] = []
         for kind, topic, take, qos in (
             (Projection, 'panorama/projection', self._take_projection, LATCHED),
             (Overlaps, 'panorama/overlap', self._take_overlaps, LATCHED),
@@ -43,13 +46,16 @@ class ViewerNode(Node):
         self._client = self.create_client(CalibrateOverlap, 'calibrate_overlap')
         self._watch = self.create_guard_condition(self._follow_browsers)
         self._server = ViewerServer(
-            self._declared.settings, calibrate=self._calibrate, watched=self._watch.trigger
+            self._declared.settings,
+            calibrate=self._calibrate,
+            watched=self._watch.trigger,
+            report=self._note_fault,
         )
         self._server.start()
         # The page goes on while a recording, and with it the time of ROS, stands still.
         self.create_timer(_TELL_S, self._tell, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._diagnostics = Diagnostics(self, self._report)
-        self.get_logger().info(f'the panorama is at {self.url}')
+        self._tell_where()
 
     @property
     def url(self) -> str:
@@ -60,6 +66,21 @@ class ViewerNode(Node):
         """Say goodbye to the browsers too."""
         self._server.stop()
         super().destroy_node()
+
+    def _tell_where(self) -> None:
+        """Log the address; the token goes to the terminal, because logs are read by others."""
+        address, url = self._server.address, self._server.url
+        self.get_logger().info(f'the panorama is at {address}')
+        if url == address:
+            return
+        token_file = self._declared.settings.token_file
+        if token_file:
+            self.get_logger().info(f'looking needs the token in {token_file}')
+        if not print_on_terminal(f'Open {url}') and not token_file:
+            self.get_logger().warning(
+                'looking needs a token, and there is no terminal to print it on: set the '
+                'parameter token_file to a file that shall keep it'
+            )
 
     def _follow_browsers(self) -> None:
         """Subscribe while somebody looks: the JPEG is made for subscribers only."""
@@ -82,7 +103,7 @@ class ViewerNode(Node):
         except FisheyeError as error:
             self.get_logger().warning(f'panorama/projection refused: {error}')
             return
-        self._server.tell(projection=vars(surface))
+        self._server.tell(projection=described(surface))
 
     def _take_overlaps(self, message) -> None:
         self._server.tell(overlaps=[_entry(overlap) for overlap in message.overlaps])
@@ -123,10 +144,17 @@ class ViewerNode(Node):
 
     def _report(self, report) -> None:
         report.values['browsers'] = self._server.watchers
+        for fault in list(self._faults):
+            report.add(ERROR, fault)
+
+    def _note_fault(self, sentence: str, trace: str) -> None:
+        """Log what failed in the server, whose other parts go on; called in its thread."""
+        self._faults.append(sentence)
+        self.get_logger().error(f'{sentence}\n{trace}')
 
 
 def _entry(overlap: Overlap) -> dict[str, Any]:
-    """Give what the page shows of an overlap; JSON has no NaN."""
+    """Return what the page shows of an overlap; JSON has no NaN."""
     numbers = {'confidence': overlap.confidence, 'offset_deg': overlap.offset_deg}
     return {
         'left': overlap.left_camera,

@@ -16,7 +16,7 @@ _TYPES = {
 
 
 def pages() -> dict[str, Handler]:
-    """Give what answers each path of the page."""
+    """Return what answers each path of the page."""
     web_files = files('panorama_stitch') / 'web'
     answers = {
         f'/{path.name}': _page(path.name, path.read_bytes()) for path in web_files.iterdir()

@@ -11,14 +11,27 @@ class ViewerSettings:
 
     host: str = setting(
         '127.0.0.1',
-        'Address to serve on. 0.0.0.0 lets other machines look; the buttons then need the token '
-        'that is printed at start.',
+        'Address to serve on. 0.0.0.0 serves other machines too; looking and the buttons then '
+        'need the token that is printed on the terminal at start.',
     )
     port: int = setting(8080, 'Port to serve on; 0: a free one.', minimum=0, maximum=65535)
+    public: bool = setting(
+        False, 'Everybody who reaches the port may look; the buttons still need the token.'
+    )
+    token_file: str = setting(
+        '',
+        'File that keeps the token from one start to the next; made, for its owner only, where '
+        'there is none. Empty: a new token at each start.',
+    )
     save: bool = setting(
         False, 'Calibrate also saves the overlap, in the overlap_file of the node that stitches.'
     )
-    max_clients: int = setting(8, 'Browsers that may look at once.', minimum=1, maximum=100)
+    max_clients: int = setting(
+        8,
+        'Browsers that may look at once; one without the token leaves for one that has it.',
+        minimum=1,
+        maximum=100,
+    )
     stale_after_s: float = setting(
         1.0,
         'A picture that is older is shown to nobody new, and the page says that none comes.',

@@ -5,7 +5,9 @@ from xml.etree import ElementTree
 import cv2
 import numpy as np
 import pytest
+from fisheye_msgs.msg import Projection
 
+from fisheye_bridge.projection import surface_of
 from fisheye_geometry.errors import SettingError
 from fisheye_geometry.surface import Surface
 from panorama_stitch.snapshot import gpano, on_sphere, save
@@ -89,7 +91,7 @@ def test_a_png_has_its_projection_beside_it(tmp_path):
     assert paths == [tmp_path / 'new' / 'here.png', tmp_path / 'new' / 'here.json']
     np.testing.assert_array_equal(cv2.imread(str(paths[0])), image)
     described = json.loads(paths[1].read_text())
-    assert Surface(**described['projection']) == surface
+    assert surface_of(Projection(**described['projection'])) == surface
     assert (described['image'], described['stamp_ns']) == ('here.png', STAMP_NS)
     assert described['taken'] == '2023-11-14T22:13:20.250000+00:00'
 

@@ -165,7 +165,7 @@ def test_the_page_is_told_what_the_rig_says(ros):
                     return told
 
     told = visit(hear)
-    assert told['projection']['kind'] == 'cylindrical'
+    assert told['projection']['surface'] == 'cylindrical'
     assert told['projection']['focal_px'] == 160.0
     # JSON has no NaN, and a browser would refuse it.
     assert [overlap['confidence'] for overlap in told['overlaps']] == [0.9, None]

@@ -1,80 +1,19 @@
 import asyncio
-import json
 import re
 import socket
 import time
-from concurrent.futures import Future
 from pathlib import Path
 
 import aiohttp
 import pytest
+from serving import DEADLINE_S, address, answered, picture, request, state, visit
 
 import panorama_stitch
 from fisheye_geometry.errors import OverlapError, SettingError
 from panorama_stitch.viewer_server import ViewerServer
 from panorama_stitch.viewer_settings import ViewerSettings
 
-DEADLINE_S = 10.0
 WEB = Path(panorama_stitch.__file__).parent / 'web'
-
-
-def answered(sentence):
-    future = Future()
-    future.set_result(sentence)
-    return future
-
-
-@pytest.fixture
-def serve():
-    servers = []
-
-    def start(calibrate=lambda: answered('measured'), watched=lambda: None, **settings):
-        settings = ViewerSettings(**{'port': 0, 'stale_after_s': 60.0, **settings})
-        server = ViewerServer(settings, calibrate=calibrate, watched=watched)
-        servers.append(server)
-        server.start()
-        return server
-
-    yield start
-    for server in servers:
-        server.stop()
-
-
-def visit(scenario):
-    """Run a coroutine that takes a client session."""
-
-    async def run():
-        async with aiohttp.ClientSession() as session:
-            return await asyncio.wait_for(scenario(session), DEADLINE_S)
-
-    return asyncio.run(run())
-
-
-def address(server, path=''):
-    return server.url.partition('#')[0] + path
-
-
-def request(method, url, **arguments):
-    async def scenario(session):
-        async with session.request(method, url, **arguments) as reply:
-            return reply.status, await reply.read(), reply.headers
-
-    return visit(scenario)
-
-
-async def picture(stream):
-    """Skip the states before the next picture."""
-    while True:
-        message = await stream.receive()
-        if message.type is aiohttp.WSMsgType.BINARY:
-            return message.data
-        assert message.type is aiohttp.WSMsgType.TEXT, message
-
-
-async def state(stream, condition):
-    while not condition(told := json.loads((await stream.receive()).data)):
-        pass
-    return told
 
 
 def wait_for(condition):
@@ -191,6 +130,7 @@ def test_a_stale_picture_is_shown_to_nobody_new(serve):
             while status != 503:
                 async with session.post(address(server, 'snapshot')) as reply:
                     status = reply.status
+                await asyncio.sleep(0.05)
             async with session.ws_connect(address(server, 'live')) as second:
                 await state(second, lambda _: True)
                 server.show(b'new')
@@ -291,23 +231,31 @@ def test_a_snapshot_is_the_newest_picture(serve):
     assert (status, body, headers['Content-Type']) == (200, b'jpeg', 'image/jpeg')
 
 
+def unserved(**settings):
+    return ViewerServer(ViewerSettings(**settings), calibrate=None, watched=None, report=None)
+
+
 def test_a_port_in_use_is_a_sentence():
     with socket.socket() as other:
         other.bind(('127.0.0.1', 0))
         other.listen()
         port = other.getsockname()[1]
-        server = ViewerServer(ViewerSettings(port=port), calibrate=None, watched=None)
+        server = unserved(port=port)
         with pytest.raises(SettingError, match=f'port {port} of 127.0.0.1 is in use'):
             server.start()
 
 
 def test_an_address_of_another_machine_is_a_sentence():
-    server = ViewerServer(ViewerSettings(host='203.0.113.7', port=0), calibrate=None, watched=None)
+    server = ViewerServer(
+        ViewerSettings(host='203.0.113.7', port=0), calibrate=None, watched=None, report=None
+    )
     with pytest.raises(SettingError, match=r'cannot serve on port 0 of 203\.0\.113\.7'):
         server.start()
 
 
 def test_a_name_that_cannot_be_one_is_a_sentence():
-    server = ViewerServer(ViewerSettings(host='....', port=0), calibrate=None, watched=None)
+    server = ViewerServer(
+        ViewerSettings(host='....', port=0), calibrate=None, watched=None, report=None
+    )
     with pytest.raises(SettingError, match=r'cannot serve on port 0 of \.\.\.\.: '):
         server.start()

@@ -1,16 +1,11 @@
-// The buttons that do something on the robot's side, and the token that they may need.
+// The buttons that do something on the robot's side.
 
 const $ = (id) => document.getElementById(id);
-const KEY = 'token';
 
 export class Buttons {
-  constructor() {
+  constructor(token) {
+    this.token = token;
     this.needToken = false;
-    const given = new URLSearchParams(location.hash.slice(1)).get(KEY);
-    if (given) {
-      sessionStorage.setItem(KEY, given);
-      history.replaceState(null, '', location.pathname);
-    }
     $('calibrate').addEventListener('click', () => this.press('calibrate', calibrated));
     $('snapshot').addEventListener('click', () => this.press('snapshot', save));
     $('fullscreen').hidden = !document.fullscreenEnabled;
@@ -22,30 +17,18 @@ export class Buttons {
 
   /** Ask the viewer for what a button stands for, and hand a good reply on. */
   async press(name, use) {
-    const token = await this.token();
-    if (token === null) return;
+    const token = this.token.value || (this.needToken ? await this.token.ask() : '');
+    if (this.needToken && !token) return;
     $(name).disabled = true;
     const reply = await fetch(`/${name}`, { method: 'POST', headers: { 'X-Token': token } })
       .catch(() => null);
     $(name).disabled = false;
-    if (reply?.status === 403) sessionStorage.removeItem(KEY);
+    if (reply?.status === 403) {
+      this.token.forget();
+      this.needToken = true;
+    }
     if (reply?.ok) say(await use(reply));
     else say(reply ? await reply.text() : 'The viewer does not answer');
-  }
-
-  /** Give the token, '' if none is needed, null if nobody gives one. */
-  async token() {
-    if (!this.needToken) return '';
-    const known = sessionStorage.getItem(KEY);
-    if (known) return known;
-    const dialog = $('ask');
-    dialog.returnValue = '';
-    dialog.showModal();
-    await new Promise((closed) => { dialog.onclose = closed; });
-    const typed = $('token').value.trim();
-    if (dialog.returnValue !== 'use' || !typed) return null;
-    sessionStorage.setItem(KEY, typed);
-    return typed;
   }
 }
 

@@ -2,7 +2,7 @@
 // Rays are [x right, y down, z ahead]; angles are radians, bearings positive to the right.
 
 /** Surfaces by number, as the shader knows them. */
-export const KINDS = ['cylindrical', 'equirectangular', 'rectilinear'];
+export const SURFACES = ['cylindrical', 'equirectangular', 'rectilinear'];
 
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 
@@ -10,14 +10,18 @@ const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 export class Projection {
   constructor(message) {
     Object.assign(this, message);
+    if (!SURFACES.includes(this.surface)) {
+      throw new Error(`this page cannot show a ${this.surface} panorama; `
+        + `expected ${SURFACES.join(', ')}`);
+    }
   }
 
   /** Ray of a pixel; integers are pixel centres. */
   ray(x, y) {
     const a = (x - this.center_x_px) / this.focal_px;
     const b = (y - this.center_y_px) / this.focal_px;
-    if (this.kind === 'cylindrical') return [Math.sin(a), b, Math.cos(a)];
-    if (this.kind === 'rectilinear') return [a, b, 1];
+    if (this.surface === 'cylindrical') return [Math.sin(a), b, Math.cos(a)];
+    if (this.surface === 'rectilinear') return [a, b, 1];
     return [Math.cos(b) * Math.sin(a), Math.sin(b), Math.cos(b) * Math.cos(a)];
   }
 
@@ -25,8 +29,8 @@ export class Projection {
   pixel([x, y, z]) {
     const side = Math.hypot(x, z);
     let point = [Math.atan2(x, z), Math.atan2(y, side)];
-    if (this.kind === 'cylindrical') point[1] = y / side;
-    if (this.kind === 'rectilinear') point = z > 0 ? [x / z, y / z] : null;
+    if (this.surface === 'cylindrical') point[1] = y / side;
+    if (this.surface === 'rectilinear') point = z > 0 ? [x / z, y / z] : null;
     return point && [
       this.center_x_px + this.focal_px * point[0],
       this.center_y_px + this.focal_px * point[1],
@@ -45,7 +49,7 @@ export class Projection {
     const [, top] = this.angles(this.center_x_px, -0.5);
     const [, bottom] = this.angles(this.center_x_px, this.height - 0.5);
     const beyond = (edge_px) => Math.abs(edge_px - this.center_x_px) >= Math.PI * this.focal_px;
-    const round = this.kind !== 'rectilinear' && beyond(-0.5) && beyond(this.width - 0.5);
+    const round = this.surface !== 'rectilinear' && beyond(-0.5) && beyond(this.width - 0.5);
     return { left: round ? -Infinity : left, right: round ? Infinity : right, top, bottom };
   }
 }

@@ -2,21 +2,38 @@
 
 const SILENT_MS = 4000; // the server tells its state twice a second
 const RETRY_MS = 1000;
+const REFUSED = 1008; // the close code for a token that is missing or wrong
 
 export class Live {
-  /** `on` has the functions state, picture (gives a promise: drawn) and lost. */
-  constructor(on) {
+  /** `on` has the functions state, picture (gives a promise: drawn), lost and refused. */
+  constructor(token, on) {
+    this.token = token;
     this.on = on;
+    this.isRefused = false;
     this.open();
     setInterval(() => this.watch(), RETRY_MS);
+    // Who does not look leaves the place and the link to others.
+    document.addEventListener('visibilitychange', () => {
+      if (document.hidden) this.socket.close();
+      else this.watch();
+    });
   }
 
   open() {
+    this.socket?.close();
     this.heard = performance.now();
-    const socket = new WebSocket(`${location.protocol.replace('http', 'ws')}//${location.host}/live`);
+    this.isRefused = false;
+    const offered = ['panorama', ...(this.token.value ? [`token.${this.token.value}`] : [])];
+    const address = `${location.protocol.replace('http', 'ws')}//${location.host}/live`;
+    const socket = new WebSocket(address, offered);
     socket.binaryType = 'blob';
     socket.onmessage = ({ data }) => this.take(socket, data);
-    socket.onclose = ({ reason }) => socket === this.socket && this.on.lost(reason);
+    socket.onclose = ({ code, reason }) => {
+      if (socket !== this.socket) return;
+      this.isRefused = code === REFUSED;
+      this.on.lost(reason);
+      if (this.isRefused) this.on.refused();
+    };
     this.socket = socket;
   }
 
@@ -26,15 +43,19 @@ export class Live {
       this.on.state(JSON.parse(data));
       return;
     }
-    await this.on.picture(data);
-    if (socket.readyState === WebSocket.OPEN) socket.send('drawn');
+    try {
+      await this.on.picture(data);
+    } finally {
+      // A picture that could not be drawn does not keep the next one away.
+      if (socket.readyState === WebSocket.OPEN) socket.send('drawn');
+    }
   }
 
   /** Give up a connection that has gone silent, and open a new one for one that has ended. */
   watch() {
-    if (this.socket.readyState === WebSocket.CLOSED) this.open();
+    if (document.hidden || this.isRefused) return;
+    if (this.socket.readyState >= WebSocket.CLOSING) this.open();
     else if (performance.now() - this.heard > SILENT_MS) {
-      this.socket.close();
       this.on.lost('');
       this.open();
     }

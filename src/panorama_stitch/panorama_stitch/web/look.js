@@ -1,6 +1,6 @@
 // The view into the panorama: a shader asks for each pixel where its ray meets the panorama.
 
-import { KINDS } from '/geometry.js';
+import { SURFACES } from '/geometry.js';
 
 const VERTEX = `
   attribute vec2 corner;
@@ -81,7 +81,7 @@ export class Look {
     gl.uniformMatrix3fv(this.at('turn'), false, [
       ...ray.map((i) => right[i] - ahead[i]), ...ray.map((i) => down[i] - ahead[i]), ...ahead,
     ]);
-    gl.uniform1i(this.at('kind'), KINDS.indexOf(projection.kind));
+    gl.uniform1i(this.at('kind'), SURFACES.indexOf(projection.surface));
     gl.uniform2f(this.at('center'), projection.center_x_px, projection.center_y_px);
     gl.uniform2f(this.at('size'), projection.width, projection.height);
     gl.uniform1f(this.at('focal'), projection.focal_px);

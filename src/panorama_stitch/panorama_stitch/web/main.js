@@ -5,6 +5,7 @@ import * as controls from '/controls.js';
 import { Live } from '/live.js';
 import { Screen } from '/screen.js';
 import { Status } from '/status.js';
+import { Token } from '/token.js';
 
 const $ = (id) => document.getElementById(id);
 
@@ -85,16 +86,26 @@ class Viewer {
 
 const screen = new Screen();
 const status = new Status();
-const buttons = new Buttons();
+const token = new Token(() => live.open());
+const buttons = new Buttons(token);
 new Viewer(screen);
-new Live({
+const live = new Live(token, {
   state(state) {
-    if (state.projection) screen.place(state.projection);
+    const problems = state.problems ?? [];
+    try {
+      if (state.projection) screen.place(state.projection);
+    } catch (error) {
+      problems.push({ level: 'error', text: error.message });
+    }
     buttons.needToken = state.needs_token;
-    status.take(state);
+    status.take({ ...state, problems });
   },
   async picture(blob) {
     if (await screen.picture(blob)) status.picture();
   },
   lost: (reason) => status.lose(reason),
+  refused() {
+    token.forget();
+    token.ask();
+  },
 });

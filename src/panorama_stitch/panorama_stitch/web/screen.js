@@ -40,9 +40,10 @@ export class Screen {
     this.arrange();
   }
 
-  /** Take what the panorama shows: the state's `projection`. */
+  /** Take what the panorama shows: the state's `projection`; an Error if that cannot be drawn. */
   place(projection) {
     if (JSON.stringify(projection) === JSON.stringify(this.projection)) return;
+    this.projection = null;
     this.projection = new Projection(projection);
     this.arrange();
   }

@@ -1,0 +1,165 @@
+"""Who may be connected: bounds that hold before a request has been read.
+
+A connection begins as a stranger: it must have been answered within a few seconds, and it goes
+when room is needed, first of all one from the address that holds the most. Who has shown the
+token, or has a place to look from, is known: that connection stays.
+"""
+
+import asyncio
+import socket
+from collections import Counter, OrderedDict
+from collections.abc import Callable
+from errno import EADDRNOTAVAIL, EAFNOSUPPORT
+from ipaddress import ip_address, ip_network
+
+from aiohttp import web
+
+from panorama_stitch.viewer_allowance import Allowance
+from panorama_stitch.viewer_connection import Connection
+from panorama_stitch.viewer_faults import Faults
+
+MAX_STRANGERS = 128
+_BACKLOG = 128
+_AT_ONCE = 16
+"""Connections taken before the pictures have their turn again."""
+_PAUSE_S = 0.2
+"""When the process has no more descriptors, and no stranger holds one."""
+_CONNECTS, _CONNECTS_PER_S = 300, 200.0
+"""Of one address; the page takes about fifteen."""
+_MAX_ADDRESSES = 1000
+
+
+class Gate:
+    """Listens, and hands connections on to the web server."""
+
+    def __init__(self, faults: Faults):
+        self._faults = faults
+        self._loop = asyncio.get_running_loop()
+        self._listeners: list[socket.socket] = []
+        self._entering: set[asyncio.Task] = set()
+        self._connections: dict[asyncio.BaseTransport, Connection] = {}
+        self._strangers: dict[Connection, None] = {}
+        self._allowances: OrderedDict[str, Allowance] = OrderedDict()
+
+    async def open(self, host: str, port: int, serve: Callable[[], asyncio.Protocol]) -> int:
+        """Listen on every address of a host, and return the port.
+
+        Parameters
+        ----------
+        host, port
+            Where; port 0 is a free one.
+        serve
+            Makes what serves one connection.
+
+        Raises
+        ------
+        OSError, ValueError
+            If there is no such address, or it is in use.
+        """
+        self._serve = serve
+        places = await self._loop.getaddrinfo(host, port, type=socket.SOCK_STREAM)
+        failed = None
+        for family, _, _, _, address in dict.fromkeys(places):
+            try:
+                listener = socket.create_server(address[:2], family=family, backlog=_BACKLOG)
+            except OSError as error:
+                if error.errno not in (EADDRNOTAVAIL, EAFNOSUPPORT):
+                    raise
+                failed = error  # a name may have addresses that this machine has not
+                continue
+            listener.setblocking(False)
+            self._listeners.append(listener)
+            self._loop.add_reader(listener, self._accept, listener)
+        if failed and not self._listeners:
+            raise failed
+        return self._listeners[0].getsockname()[1]
+
+    def close(self) -> None:
+        """Listen no longer, and let every stranger go."""
+        for listener in self._listeners:
+            self._loop.remove_reader(listener)
+            listener.close()
+        self._listeners.clear()
+        for stranger in list(self._strangers):
+            stranger.abort()
+
+    def connection(self, request: web.Request) -> Connection:
+        """Return what a request came over; a `ConnectionError` if that has ended."""
+        if connection := self._connections.get(request.transport):
+            return connection
+        raise ConnectionResetError('the client has left')
+
+    def know(self, connection: Connection) -> None:
+        """Let a connection stay for as long as it likes."""
+        connection.lift_deadline()
+        self._strangers.pop(connection, None)
+
+    def entered(self, connection: Connection) -> None:
+        """Count a connection that was made."""
+        self._connections[connection.transport] = connection
+        self._strangers[connection] = None
+
+    def left(self, connection: Connection) -> None:
+        """Forget a connection that was lost."""
+        self._connections.pop(connection.transport, None)
+        self._strangers.pop(connection, None)
+
+    def _accept(self, listener: socket.socket) -> None:
+        for _ in range(_AT_ONCE):
+            try:
+                taken, (address, *_) = listener.accept()
+            except (BlockingIOError, InterruptedError, ConnectionAbortedError):
+                return
+            except OSError as error:
+                self._faults.add(error)
+                if self._strangers:
+                    self._make_room(_AT_ONCE)  # which is there when this is called again
+                else:
+                    self._loop.remove_reader(listener)
+                    self._loop.call_later(_PAUSE_S, self._resume, listener)
+                return
+            self._admit(taken, address)
+
+    def _resume(self, listener: socket.socket) -> None:
+        if listener in self._listeners:
+            self._loop.add_reader(listener, self._accept, listener)
+
+    def _admit(self, taken: socket.socket, address: str) -> None:
+        source = _source(address)
+        if not self._allowance(source).take(1, self._loop.time()):
+            taken.close()
+            return
+        self._make_room(len(self._strangers) + 1 - MAX_STRANGERS)
+        taken.setblocking(False)
+        entering = self._loop.create_task(
+            self._loop.connect_accepted_socket(
+                lambda: Connection(self, source, self._serve()), taken
+            )
+        )
+        self._entering.add(entering)
+        entering.add_done_callback(self._entering.discard)
+
+    def _allowance(self, source: str) -> Allowance:
+        allowance = self._allowances.pop(source, None)
+        if allowance is None:
+            allowance = Allowance(_CONNECTS, _CONNECTS_PER_S, self._loop.time())
+            if len(self._allowances) >= _MAX_ADDRESSES:
+                self._allowances.popitem(last=False)
+        self._allowances[source] = allowance
+        return allowance
+
+    def _make_room(self, count: int) -> None:
+        """Let strangers go, the oldest of the source that has the most."""
+        for _ in range(min(count, len(self._strangers))):
+            ((source, _),) = Counter(c.source for c in self._strangers).most_common(1)
+            oldest = next(c for c in self._strangers if c.source == source)
+            del self._strangers[oldest]
+            oldest.abort()
+
+
+def _source(address: str) -> str:
+    """Return what one client can connect from: an IPv4 address, or an IPv6 network."""
+    plain = ip_address(address.partition('%')[0])
+    if plain.version == 4:
+        return str(plain)
+    return str(plain.ipv4_mapped or ip_network((plain, 64), strict=False))

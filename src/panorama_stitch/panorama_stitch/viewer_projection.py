@@ -1,0 +1,17 @@
+"""A projection in JSON: the fields of fisheye_msgs/Projection under their own names."""
+
+from typing import Any
+
+from fisheye_geometry.surface import Surface
+
+
+def described(surface: Surface) -> dict[str, Any]:
+    """Return what JSON holds of a surface."""
+    return {
+        'surface': surface.kind,
+        'width': surface.width,
+        'height': surface.height,
+        'focal_px': surface.focal_px,
+        'center_x_px': surface.center_x_px,
+        'center_y_px': surface.center_y_px,
+    }

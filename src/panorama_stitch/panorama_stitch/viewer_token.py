@@ -1,0 +1,66 @@
+"""The token that shows who may look and press buttons: where it is kept and how it is told."""
+
+import os
+import re
+import secrets
+import stat
+from pathlib import Path
+
+from fisheye_geometry.errors import SettingError
+
+_LONGEST = 200
+_TOKEN = re.compile(r'[\w-]{8,100}', re.ASCII)
+
+
+def new_token() -> str:
+    """Return a token that nobody can guess."""
+    return secrets.token_urlsafe(12)
+
+
+def kept_token(path: Path) -> str:
+    """Return the token in a file; it is made, readable for its owner only, where there is none.
+
+    Raises
+    ------
+    SettingError
+        If the file cannot be read or written, others can read it, or it holds no token.
+    """
+    try:
+        try:
+            token = new_token()
+            with open(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), 'w') as file:
+                file.write(f'{token}\n')
+            return token
+        except FileExistsError:
+            return _read(path)
+    except OSError as error:
+        raise SettingError(f'token_file {path} cannot be used: {error.strerror}') from error
+
+
+def _read(path: Path) -> str:
+    # Without O_NONBLOCK a named pipe would be waited for.
+    with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), 'rb') as file:
+        mode = os.fstat(file.fileno()).st_mode
+        if not stat.S_ISREG(mode):
+            raise SettingError(f'token_file {path} is not a regular file')
+        if mode & 0o077:
+            raise SettingError(
+                f'token_file {path} has mode {mode & 0o777:o}, so that others can read it; '
+                'expected 600'
+            )
+        token = file.read(_LONGEST).decode(errors='replace').strip()
+    if not _TOKEN.fullmatch(token):
+        raise SettingError(
+            f'token_file {path} holds no token; expected 8 to 100 letters, digits, - and _'
+        )
+    return token
+
+
+def print_on_terminal(sentence: str) -> bool:
+    """Print where a person sits, past every log; return whether there is such a place."""
+    try:
+        with open('/dev/tty', 'w') as terminal:
+            terminal.write(f'{sentence}\n')
+    except OSError:
+        return False
+    return True

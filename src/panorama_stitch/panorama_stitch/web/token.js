@@ -1,0 +1,53 @@
+// The token that looking and the buttons may need: from the address, or typed.
+
+const $ = (id) => document.getElementById(id);
+const KEY = 'token';
+
+export class Token {
+  /** `given` is called when somebody has typed one. */
+  constructor(given) {
+    this.given = given;
+    this.asking = null;
+    this.take();
+    window.addEventListener('hashchange', () => this.take() && this.given());
+  }
+
+  /** Take the token out of the address, where others could read it. */
+  take() {
+    const token = new URLSearchParams(location.hash.slice(1)).get(KEY);
+    if (!token) return false;
+    sessionStorage.setItem(KEY, token);
+    history.replaceState(null, '', location.pathname);
+    return true;
+  }
+
+  /** The token, '' if none is known. */
+  get value() {
+    return sessionStorage.getItem(KEY) ?? '';
+  }
+
+  /** Forget a token that was refused. */
+  forget() {
+    sessionStorage.removeItem(KEY);
+  }
+
+  /** Ask for the token; gives '' if nobody types one. */
+  ask() {
+    this.asking ??= this.dialog().finally(() => { this.asking = null; });
+    return this.asking;
+  }
+
+  async dialog() {
+    const dialog = $('ask');
+    dialog.returnValue = '';
+    $('token').value = '';
+    dialog.showModal();
+    await new Promise((closed) => { dialog.onclose = closed; });
+    // Nothing else can be in a token, nor in a WebSocket's request.
+    const typed = $('token').value.replace(/[^\w-]/g, '');
+    if (dialog.returnValue !== 'use' || !typed) return '';
+    sessionStorage.setItem(KEY, typed);
+    this.given();
+    return typed;
+  }
+}

@@ -1,0 +1,272 @@
+"""Who may look: the token, the places, and how long somebody who does nothing may stay."""
+
+import os
+import pty
+import re
+import socket
+import subprocess
+import sys
+import time
+from concurrent.futures import Future
+
+import aiohttp
+import pytest
+from serving import DEADLINE_S, address, here, picture, request, state, visit
+
+from fisheye_geometry.errors import SettingError
+from panorama_stitch import viewer_browser, viewer_connection
+from panorama_stitch.viewer_token import kept_token
+
+REFUSED, LATER = 1008, 1013
+
+
+def look(session, server, token=None):
+    protocols = ('panorama', f'token.{token}') if token else ()
+    return session.ws_connect(here(server, 'live'), protocols=protocols)
+
+
+def token(server):
+    return server.url.partition('#token=')[2]
+
+
+async def farewell(stream):
+    """Give the code and the reason with which the server ends a connection."""
+    while (message := await stream.receive()).type is not aiohttp.WSMsgType.CLOSE:
+        assert not stream.closed, 'it ended without a word'
+    return message.data, message.extra
+
+
+@pytest.mark.parametrize('given', [None, 'guess', 'x' * 500])
+def test_who_has_no_token_sees_nothing_from_elsewhere(serve, given):
+    server = serve(host='0.0.0.0')
+    server.show(b'secret')
+
+    async def scenario(session):
+        async with look(session, server, given) as stream:
+            message = await stream.receive()
+            assert (message.type, message.data) == (aiohttp.WSMsgType.CLOSE, REFUSED)
+            assert 'needs the token' in message.extra
+
+    visit(scenario)
+    assert server.watchers == 0
+
+
+@pytest.mark.parametrize('is_public', [False, True])
+def test_who_has_the_token_sees_the_picture(serve, is_public):
+    server = serve(host='0.0.0.0', public=is_public)
+
+    async def scenario(session):
+        async with look(session, server, token(server)) as stream:
+            assert (await state(stream, lambda _: True))['needs_token']
+            server.show(b'picture')
+            assert await picture(stream) == b'picture'
+
+    visit(scenario)
+
+
+def test_everybody_sees_what_is_public_but_the_buttons_need_the_token(serve):
+    server = serve(host='0.0.0.0', public=True)
+
+    async def scenario(session):
+        async with look(session, server) as stream:
+            await state(stream, lambda _: True)
+            server.show(b'picture')
+            assert await picture(stream) == b'picture'
+
+    visit(scenario)
+    assert request('POST', here(server, 'snapshot'))[0] == 403
+
+
+def test_another_protocol_is_refused_without_a_word_in_the_log(serve, caplog):
+    server = serve()
+
+    async def scenario(session):
+        with pytest.raises(aiohttp.WSServerHandshakeError, match='400'):
+            await session.ws_connect(address(server, 'live'), protocols=('other',))
+
+    visit(scenario)
+    assert not [record for record in caplog.records if record.name != 'asyncio']
+
+
+def test_who_has_the_token_gets_the_place_of_one_who_has_not(serve):
+    server = serve(host='0.0.0.0', public=True, max_clients=2)
+
+    async def scenario(session):
+        strangers = [await look(session, server) for _ in range(2)]
+        for stranger in strangers:
+            await state(stranger, lambda _: True)
+        refused = await look(session, server)
+        assert await farewell(refused) == (LATER, '2 browsers look already, which is the limit')
+        operators = []
+        for stranger in strangers:
+            operators.append(await look(session, server, token(server)))
+            await state(operators[-1], lambda _: True)
+            assert await farewell(stranger) == (LATER, 'somebody with the token needed the place')
+        third = await look(session, server, token(server))
+        assert (await farewell(third))[0] == LATER
+        assert not any(operator.closed for operator in operators)
+
+    visit(scenario)
+
+
+@pytest.mark.parametrize('said', [b'', b'GET / HTTP/1.1\r\nHost: localhost\r\n'])
+def test_a_connection_without_a_request_ends(serve, monkeypatch, said):
+    monkeypatch.setattr(viewer_connection, 'ANSWERED_WITHIN_S', 0.2)
+    port = int(re.search(r':(\d+)/', serve().url)[1])
+    with socket.create_connection(('127.0.0.1', port), timeout=DEADLINE_S) as connection:
+        connection.sendall(said)
+        assert connection.recv(1) == b''
+
+
+def test_a_page_that_draws_nothing_leaves_its_place(serve, monkeypatch):
+    monkeypatch.setattr(viewer_browser, 'SILENT_S', 0.2)
+    server = serve()
+
+    async def scenario(session):
+        async with session.ws_connect(address(server, 'live')) as stream:
+            await state(stream, lambda _: True)
+            server.show(b'picture')
+            assert await picture(stream) == b'picture'
+            code, reason = await farewell(stream)
+            assert code == LATER
+            assert 'drawn nothing' in reason
+
+    visit(scenario)
+
+
+def test_who_draws_more_often_than_pictures_come_gets_no_more_of_them(serve):
+    server = serve()
+
+    async def scenario(session):
+        async with session.ws_connect(address(server, 'live')) as stream:
+            await state(stream, lambda _: True)
+            for _ in range(20):
+                await stream.send_str('drawn')
+            server.show(b'first')
+            assert await picture(stream) == b'first'
+            server.show(b'overtaken')
+            server.show(b'second')
+            server.tell(mark=1)
+            await state(stream, lambda told: told.get('mark') == 1)
+            await stream.send_str('drawn')
+            assert await picture(stream) == b'second'
+
+    visit(scenario)
+
+
+def test_a_bug_takes_only_its_part_down_and_is_told_once(serve):
+    def fail():
+        raise KeyError('a bug')
+
+    server = serve(fail)
+
+    async def scenario(session):
+        async with session.ws_connect(address(server, 'live')) as stream:
+            await state(stream, lambda _: True)
+            for _ in range(3):
+                async with session.post(address(server, 'calibrate')) as reply:
+                    assert reply.status == 500
+            server.show(b'on')
+            assert await picture(stream) == b'on'
+            server.tell(wrong=object())
+            while not stream.closed:
+                await stream.receive()
+        server.tell(wrong=None)
+        async with session.ws_connect(address(server, 'live')) as stream:
+            await state(stream, lambda _: True)
+
+    visit(scenario)
+    calibration, feeding = server.faults
+    assert 'KeyError' in calibration
+    assert 'test_viewer_access.py' in calibration
+    assert 'JSON' in feeding
+    server.faults.clear()
+
+
+def test_a_calibration_that_is_a_bug_in_its_answer_is_a_fault_too(serve):
+    future = Future()
+    future.set_exception(ZeroDivisionError('a bug'))
+    server = serve(lambda: future)
+    assert request('POST', address(server, 'calibrate'))[0] == 500
+    assert 'ZeroDivisionError' in server.faults.pop()
+
+
+def test_a_token_file_is_made_for_its_owner_and_read_again(serve, tmp_path):
+    path = tmp_path / 'token'
+    first = token(serve(host='0.0.0.0', token_file=str(path)))
+    assert path.stat().st_mode & 0o777 == 0o600
+    assert path.read_text().strip() == first
+    assert token(serve(host='0.0.0.0', token_file=str(path))) == first
+    assert serve(token_file=str(tmp_path / 'unused')).url.endswith('/')
+    assert not (tmp_path / 'unused').exists()
+
+
+@pytest.mark.parametrize(
+    ('content', 'mode', 'sentence'),
+    [
+        ('12345678', 0o644, 'has mode 644, so that others can read it; expected 600'),
+        ('short', 0o600, 'holds no token; expected 8 to 100 letters'),
+        ('with a space in it', 0o600, 'holds no token'),
+        ('x' * 10_000, 0o600, 'holds no token'),
+    ],
+)
+def test_a_token_file_that_is_none_is_refused(tmp_path, content, mode, sentence):
+    path = tmp_path / 'token'
+    path.write_text(content)
+    path.chmod(mode)
+    with pytest.raises(SettingError, match=sentence):
+        kept_token(path)
+
+
+def test_a_token_file_that_is_no_file_is_refused(tmp_path):
+    os.mkfifo(tmp_path / 'pipe', 0o600)
+    for name, sentence in (('pipe', 'not a regular'), ('no/token', 'No such'), ('', 'directory')):
+        with pytest.raises(SettingError, match=sentence):
+            kept_token(tmp_path / name)
+
+
+def run_node(folder, seconds_to_address, has_terminal):
+    """Run the node until it has told its address; give terminal, output and log files."""
+    leader, follower = pty.openpty()
+    code = 'from panorama_stitch.viewer_node import main; main()'
+    if has_terminal:
+        take = f'import fcntl, termios; fcntl.ioctl({follower}, termios.TIOCSCTTY, 0); '
+        code = take + code
+    words = ['--ros-args', '-p', 'host:=0.0.0.0', '-p', 'port:=0']
+    with (folder / 'output').open('wb') as output:
+        process = subprocess.Popen(
+            [sys.executable, '-c', code, *words],
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=output,
+            start_new_session=True,
+            pass_fds=(follower,),
+            env={**os.environ, 'ROS_LOG_DIR': str(folder / 'log')},
+        )
+    os.close(follower)
+    deadline = time.monotonic() + seconds_to_address
+    expected = 'the panorama is at' if has_terminal else 'no terminal'
+    while expected not in (folder / 'output').read_text():
+        assert time.monotonic() < deadline, 'there was no address'
+        time.sleep(0.05)
+    terminal = os.read(leader, 1000).decode() if has_terminal else ''
+    process.terminate()
+    assert process.wait(DEADLINE_S) == 0
+    os.close(leader)
+    logs = [path.read_text() for path in (folder / 'log').rglob('*') if path.is_file()]
+    return terminal, (folder / 'output').read_text(), logs
+
+
+def test_the_token_goes_to_the_terminal_and_into_no_log(tmp_path):
+    terminal, output, logs = run_node(tmp_path, 30.0, True)
+    url, told = re.search(r'(http://\S+)#token=(\S+)', terminal).groups()
+    assert any(url in log for log in logs)
+    for text in (output, *logs):
+        assert told not in text
+        assert 'token=' not in text
+
+
+def test_without_a_terminal_the_node_says_where_the_token_can_be_kept(tmp_path):
+    _, output, logs = run_node(tmp_path, 30.0, False)
+    assert 'set the parameter token_file' in output
+    assert not any('token=' in text for text in (output, *logs))
