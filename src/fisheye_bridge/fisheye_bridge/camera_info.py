@@ -3,40 +3,43 @@
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
-from fisheye_geometry.camera_file import Camera
+from fisheye_geometry.camera import Camera, Readout, camera_from
 from fisheye_geometry.errors import CalibrationError
 from fisheye_geometry.lens import Lens, make_lens
 
 
 def camera_of(message: CameraInfo, name: str = '') -> Camera:
-    """Give the camera that a message describes.
+    """Return the camera whose pictures come with a message: binned and cropped as it says.
 
     Raises
     ------
     CalibrationError
-        If the camera is not calibrated, is binned or cropped, or the numbers describe no lens.
+        If the camera is not calibrated, or the numbers describe no lens or no part of its sensor.
     """
     if not any(message.k):
         raise CalibrationError(
             'the camera is not calibrated (K is zero); make a calibration file with '
             'calibrate_lens and name it in camera_info_url'
         )
-    if max(message.binning_x, message.binning_y) > 1:
-        raise CalibrationError(
-            f'binning is {message.binning_x}x{message.binning_y}; expected full pictures'
-        )
-    roi = message.roi
-    if (roi.width or message.width, roi.height or message.height) != (
-        message.width,
-        message.height,
-    ):
-        raise CalibrationError(f'roi is {roi.width}x{roi.height} px; expected full pictures')
     lens = make_lens(message.distortion_model, message.width, message.height, message.k, message.d)
-    return Camera(name, lens, tuple(map(float, message.r)), tuple(map(float, message.p)))
+    return readout_of(message).of(camera_from(name, lens, message.r, message.p))
+
+
+def readout_of(message: CameraInfo) -> Readout:
+    """Return the part of the sensor that a message names."""
+    roi = message.roi
+    return Readout(
+        x_offset=roi.x_offset,
+        y_offset=roi.y_offset,
+        width=roi.width,
+        height=roi.height,
+        binning_x=message.binning_x,
+        binning_y=message.binning_y,
+    )
 
 
 def camera_info_of(camera: Camera, header: Header) -> CameraInfo:
-    """Describe a camera in a message."""
+    """Describe a camera in a message, the pictures as all of its sensor."""
     lens: Lens = camera.lens
     return CameraInfo(
         header=header,

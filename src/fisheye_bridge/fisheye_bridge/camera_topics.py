@@ -7,10 +7,11 @@ from rclpy.node import Node
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
-from fisheye_bridge.camera_info import camera_of
+from fisheye_bridge.camera_info import camera_of, readout_of
 from fisheye_bridge.diagnostics import ERROR, WARN, WARNING_PAUSE_S, Report
 from fisheye_bridge.qos import BEST_EFFORT_INPUT
 from fisheye_bridge.topics import ImageSubscription
+from fisheye_geometry.camera import Readout
 from fisheye_geometry.errors import CalibrationError, FisheyeError
 from fisheye_geometry.image_circle import SeenLens
 from fisheye_geometry.lens import Lens
@@ -62,7 +63,7 @@ class CameraSubscription:
         self._seen: SeenLens | None = None
         self._content, self._header = '', Header()
         self._picture_size: tuple[int, int] | None = None
-        self._refusal, self._is_over = '', False
+        self._refusal, self._is_over, self._note = '', False, ''
         self.pictures = ImageSubscription(
             node,
             f'{self._prefix}image_raw',
@@ -106,35 +107,43 @@ class CameraSubscription:
             report.add(ERROR, f'waiting for {what}')
         if self._is_over:
             self._refusal = ''
+        if self._note:
+            report.add(WARN, self._note)
         self.pictures.dropped.tell(report)
 
     def _take_camera_info(self, message: CameraInfo) -> None:
+        readout = readout_of(message)
         size = message.width, message.height
-        content = repr((*size, message.distortion_model, *message.k, *message.d))
+        content = repr((*size, readout, message.distortion_model, *message.k, *message.d))
         if content == self._content:
             self._is_over = True
             if self._picture_size is None:
                 self._tell()
             return
         try:
-            if self._picture_size not in (None, size):
+            lens = camera_of(message).lens
+            if self._picture_size not in (None, (lens.width, lens.height)):
+                whole = f'{size[0]}x{size[1]} px'
+                part = '' if readout == Readout() else f' ({whole} with {readout})'
                 raise CalibrationError(
-                    '{}x{} px do not fit the pictures, which have {}x{} px'.format(
-                        *size, *self._picture_size
+                    '{}x{} px{} do not fit the pictures, which have {}x{} px'.format(
+                        lens.width, lens.height, part, *self._picture_size
                     )
                 )
-            lens = camera_of(message).lens
             self._check(lens)
         except FisheyeError as error:
             self.refuse(error)
             return
-        self._content, self._header = content, message.header
+        self._content, self._header, self._note = content, message.header, ''
         self._seen = SeenLens(lens)
 
     def _take_picture(self, image: np.ndarray, encoding: str, header: Header) -> None:
         self._picture_size = image.shape[1::-1]
         if self._seen and self._seen.look(image):
             self._tell()
+        if self._seen and self._seen.note and not self._note:
+            self._note = f'{self._prefix}camera_info: {self._seen.note}'
+            self._node.get_logger().warning(self._note)
         self._on_picture(image, encoding, header)
 
     def _tell(self) -> None:

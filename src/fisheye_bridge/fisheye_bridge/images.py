@@ -1,5 +1,6 @@
 """sensor_msgs/Image to arrays and back, without a copy wherever the layout allows."""
 
+import re
 from array import array
 from dataclasses import dataclass
 
@@ -22,26 +23,38 @@ class _Format:
     conversion: int | None = None
     block: int = 1
     """Width and height must be multiples of it: pixels that share colour."""
+    depth: int = 1
+    """Bytes of a value, of which the most significant one is taken."""
+    name: str = 'bgr8'
+    """Of `CHANNELS`: what it becomes."""
 
 
 _YUY2 = _Format(2, cv2.COLOR_YUV2BGR_YUY2, 2)
 _UYVY = _Format(2, cv2.COLOR_YUV2BGR_UYVY, 2)
 # OpenCV names a Bayer pattern by its second row and column, ROS by its first.
+_BAYER = {
+    'rggb': cv2.COLOR_BayerBG2BGR,
+    'bggr': cv2.COLOR_BayerRG2BGR,
+    'gbrg': cv2.COLOR_BayerGR2BGR,
+    'grbg': cv2.COLOR_BayerGB2BGR,
+}
 _FORMATS = {
     'bgr8': _Format(3),
-    'rgb8': _Format(3),
-    'mono8': _Format(1),
+    'rgb8': _Format(3, name='rgb8'),
+    'mono8': _Format(1, name='mono8'),
+    '8UC3': _Format(3),
+    '8UC1': _Format(1, name='mono8'),
+    'mono16': _Format(1, depth=2, name='mono8'),
     'bgra8': _Format(4, cv2.COLOR_BGRA2BGR),
     'rgba8': _Format(4, cv2.COLOR_RGBA2BGR),
     'yuv422_yuy2': _YUY2,
     'yuyv': _YUY2,
     'uyvy': _UYVY,
     'yuv422': _UYVY,
-    'bayer_rggb8': _Format(1, cv2.COLOR_BayerBG2BGR, 2),
-    'bayer_bggr8': _Format(1, cv2.COLOR_BayerRG2BGR, 2),
-    'bayer_gbrg8': _Format(1, cv2.COLOR_BayerGR2BGR, 2),
-    'bayer_grbg8': _Format(1, cv2.COLOR_BayerGB2BGR, 2),
+    **{f'bayer_{pattern}8': _Format(1, code, 2) for pattern, code in _BAYER.items()},
+    **{f'bayer_{pattern}16': _Format(1, code, 2, depth=2) for pattern, code in _BAYER.items()},
 }
+_COMPRESSED_COLOR = re.compile(r'compressed (rgb|bgr)')
 
 
 def to_array(message: Image) -> tuple[np.ndarray, str]:
@@ -50,7 +63,8 @@ def to_array(message: Image) -> tuple[np.ndarray, str]:
     Parameters
     ----------
     message
-        An image in one of the 8-bit encodings; padded rows are fine, byte order means nothing.
+        An image of values of 8 bits, or of 16, of which the upper 8 are taken; padded rows are
+        fine.
 
     Returns
     -------
@@ -58,7 +72,7 @@ def to_array(message: Image) -> tuple[np.ndarray, str]:
         (height, width[, 3]) uint8: the message's own memory where its encoding is one of
         `CHANNELS`, a new array otherwise.
     encoding : str
-        Of the array: the message's own, or 'bgr8' where it was converted.
+        Of the array, one of `CHANNELS`.
 
     Raises
     ------
@@ -75,20 +89,29 @@ def to_array(message: Image) -> tuple[np.ndarray, str]:
     size = f'an image of {width}x{height} px in {message.encoding}'
     if not (1 <= width <= MAX_PICTURE_SIDE_PX and 1 <= height <= MAX_PICTURE_SIDE_PX):
         raise ImageFormatError(f'{size}; expected sides of 1 to {MAX_PICTURE_SIDE_PX} px')
-    if form.block > 1 and (width % 2 or (height % 2 and form.channels == 1)):
-        raise ImageFormatError(f'{size}; this encoding shares colour and needs an even size')
-    if step < width * form.channels:
-        raise ImageFormatError(
-            f'{size} has rows of {step} bytes; expected {width * form.channels}'
-        )
+    _check_block(form, width, height, message.encoding)
+    row = width * form.channels * form.depth
+    if step < row:
+        raise ImageFormatError(f'{size} has rows of {step} bytes; expected {row}')
     if len(message.data) != step * height:
         raise ImageFormatError(f'{size} has {len(message.data)} bytes; expected {step * height}')
     shape = (height, width) if form.channels == 1 else (height, width, form.channels)
-    strides = (step, 1) if form.channels == 1 else (step, form.channels, 1)
-    pixels = np.ndarray(shape, np.uint8, message.data, strides=strides)
-    if form.conversion is None:
-        return pixels, message.encoding
-    return cv2.cvtColor(pixels, form.conversion), 'bgr8'
+    strides = (step, form.depth) if form.channels == 1 else (step, form.channels, 1)
+    upper = 0 if message.is_bigendian else form.depth - 1
+    pixels = np.ndarray(shape, np.uint8, message.data, upper, strides)
+    if form.depth > 1:
+        pixels = np.ascontiguousarray(pixels)
+    if form.conversion is not None:
+        pixels = cv2.cvtColor(pixels, form.conversion)
+    return pixels, form.name
+
+
+def _check_block(form: _Format, width: int, height: int, encoding: str) -> None:
+    if form.block > 1 and (width % 2 or (height % 2 and form.channels == 1)):
+        raise ImageFormatError(
+            f'an image of {width}x{height} px in {encoding}; this encoding shares colour and '
+            'needs an even size'
+        )
 
 
 class ImageBuffer:
@@ -147,13 +170,25 @@ def jpeg_message(coded: np.ndarray, encoding: str, header: Header) -> Compressed
 
 
 def from_jpeg(message: CompressedImage) -> tuple[np.ndarray, str]:
-    """Decode a compressed picture to (height, width[, 3]) uint8 and 'mono8' or 'bgr8'.
+    """Decode a compressed picture to (height, width[, 3]) uint8 and its encoding.
+
+    `format` begins with the encoding of what was compressed; a Bayer mosaic was compressed as
+    grey. Where it says nothing, the picture is taken in colour.
 
     Raises
     ------
     ImageFormatError
         If the data is no picture, or one that is too large.
     """
-    grey = message.format.startswith('mono8')
+    encoding = message.format.partition(';')[0].strip()
+    form = _FORMATS.get(encoding, _FORMATS['bgr8'])
+    grey = form.channels == 1
     image = decoded(np.frombuffer(message.data, np.uint8), grey=grey)
-    return image, 'mono8' if grey else 'bgr8'
+    if grey:
+        if form.conversion is not None:
+            height, width = image.shape
+            _check_block(form, width, height, encoding)
+            image = cv2.cvtColor(image, form.conversion)
+        return image, form.name
+    stored = _COMPRESSED_COLOR.search(message.format)
+    return image, 'rgb8' if stored and stored[1] == 'rgb' else 'bgr8'

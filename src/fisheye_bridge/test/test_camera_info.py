@@ -1,5 +1,6 @@
 """CameraInfo: there and back, and what is no calibration refused."""
 
+import numpy as np
 import pytest
 from fisheye_msgs.msg import Projection
 from std_msgs.msg import Header
@@ -27,7 +28,9 @@ def test_a_camera_comes_back():
     ('change', 'words'),
     [
         ({'k': [0.0] * 9}, 'not calibrated'),
-        ({'binning_x': 2}, 'binning is 2x0'),
+        ({'binning_x': 641}, 'binning_x is 641; expected up to 640 px'),
+        ({'r': [float('nan')] * 9}, 'R holds nan; expected finite numbers'),
+        ({'p': [float('inf')] * 12}, 'P holds inf; expected finite numbers'),
         ({'distortion_model': 'unheard'}, "'unheard' is not known"),
         ({'d': [0.1]}, '1 distortion coefficients'),
         ({'width': 0}, 'width is 0 px'),
@@ -41,10 +44,21 @@ def test_what_is_no_calibration_is_refused(change, words):
         camera_of(message)
 
 
-def test_a_cropped_camera_is_refused():
+def test_a_cropped_and_binned_camera_is_that_of_its_pictures():
     message = camera_info_of(Camera('left', LENS), Header())
-    message.roi.width, message.roi.height = 320, 240
-    with pytest.raises(CalibrationError, match='roi is 320x240 px'):
+    message.binning_x, message.binning_y = 2, 1
+    roi = message.roi
+    roi.x_offset, roi.y_offset, roi.width, roi.height = 100, 40, 320, 240
+    lens = camera_of(message).lens
+    assert (lens.width, lens.height) == (160, 240)
+    ray, _ = LENS.unproject(np.array([300.5, 100.0]))  # between two pixels that became one
+    assert lens.project(ray)[0] == pytest.approx([100.0, 60.0])
+
+
+def test_a_crop_that_is_not_on_the_sensor_is_refused():
+    message = camera_info_of(Camera('left', LENS), Header())
+    message.roi.x_offset, message.roi.width, message.roi.height = 400, 320, 240
+    with pytest.raises(CalibrationError, match='roi has 320 px from 400 on along x'):
         camera_of(message)
 
 

@@ -30,15 +30,19 @@ def message_of(pixels, encoding, padding=0):
     padded = np.pad(rows, ((0, 0), (0, padding)), constant_values=99)
     channels = pixels.shape[2] if pixels.ndim == 3 else 1
     message = Image(
-        width=rows.shape[1] // channels, height=len(rows), encoding=encoding, step=padded.shape[1]
+        width=rows.shape[1] // channels,
+        height=len(rows),
+        encoding=encoding,
+        step=padded.shape[1] * pixels.itemsize,
+        is_bigendian=pixels.dtype.byteorder == '>',
     )
     message.data.frombytes(padded.tobytes())
     return message
 
 
-def mosaic(pattern):
+def mosaic(pattern, depth=np.uint8):
     """Sample COLORS through a Bayer pattern named by its first two rows."""
-    out = np.empty(COLORS.shape[:2], np.uint8)
+    out = np.empty(COLORS.shape[:2], depth)
     for index, color in enumerate(pattern):
         y, x = divmod(index, 2)
         out[y::2, x::2] = COLORS[y::2, x::2, 'bgr'.index(color)]
@@ -88,6 +92,36 @@ def test_bayer_patterns_give_the_colors_back(pattern):
     assert (array[2:-2, -4:-2] == COLORS[2:-2, -4:-2]).all()
 
 
+@pytest.mark.parametrize('padding', [0, 3])
+@pytest.mark.parametrize(('encoding', 'same'), [('8UC3', 'bgr8'), ('8UC1', 'mono8')])
+def test_opencv_names_of_bytes_are_the_messages_own_memory(encoding, same, padding):
+    pixels = COLORS[..., 0] if same == 'mono8' else COLORS
+    message = message_of(pixels, encoding, padding)
+    array, name = to_array(message)
+    assert name == same
+    assert (array == pixels).all()
+    assert np.shares_memory(array, np.frombuffer(message.data, np.uint8))
+
+
+@pytest.mark.parametrize('padding', [0, 3])
+@pytest.mark.parametrize('order', ['<u2', '>u2'])
+def test_of_sixteen_bits_the_upper_eight_are_shown(order, padding):
+    levels = np.linspace(0, 65535, 96).reshape(8, 12)
+    array, name = to_array(message_of(levels.astype(order), 'mono16', padding))
+    assert name == 'mono8'
+    np.testing.assert_array_equal(array, levels.astype(int) // 256)
+
+
+@pytest.mark.parametrize('order', ['<u2', '>u2'])
+@pytest.mark.parametrize('pattern', ['rggb', 'bggr', 'gbrg', 'grbg'])
+def test_bayer_patterns_of_sixteen_bits_give_the_colors_back(pattern, order):
+    sensor = (mosaic(pattern, np.uint16) * 256 + 77).astype(order)
+    array, name = to_array(message_of(sensor, f'bayer_{pattern}16', padding=2))
+    assert name == 'bgr8'
+    assert (array[2:-2, 2:4] == COLORS[2:-2, 2:4]).all()
+    assert (array[2:-2, -4:-2] == COLORS[2:-2, -4:-2]).all()
+
+
 @pytest.mark.parametrize(
     ('encoding', 'order'),
     [('yuv422_yuy2', 'yuyv'), ('yuyv', 'yuyv'), ('uyvy', 'uyvy'), ('yuv422', 'uyvy')],
@@ -101,7 +135,8 @@ def test_shared_chroma(encoding, order):
 @pytest.mark.parametrize(
     ('change', 'words'),
     [
-        ({'encoding': 'mono16'}, "'mono16' is not taken; expected one of bgr8, rgb8"),
+        ({'encoding': '16UC1'}, "'16UC1' is not taken; expected one of bgr8, rgb8"),
+        ({'encoding': 'mono16', 'width': 19}, 'mono16 has rows of 36 bytes; expected 38'),
         ({'encoding': ''}, "'' is not taken"),
         ({'width': 0}, '0x8 px in bgr8; expected sides of 1 to'),
         ({'height': 2**31}, '12x2147483648 px in bgr8; expected sides'),
@@ -154,6 +189,60 @@ def test_jpeg_is_what_image_transport_reads(encoding, form):
     assert name == ('mono8' if encoding == 'mono8' else 'bgr8')
     expected = converted(COLORS, 'bgr8', name)
     assert np.abs(array[:, 1:5].astype(int) - expected[:, 1:5]).max() <= CHROMA_LEVELS
+
+
+def compressed(image, form, suffix='.png'):
+    message = CompressedImage(format=form)
+    message.data.frombytes(cv2.imencode(suffix, image)[1].tobytes())
+    return message
+
+
+@pytest.mark.parametrize('pattern', ['rggb', 'bggr', 'gbrg', 'grbg'])
+@pytest.mark.parametrize(
+    ('kind', 'scale', 'suffix'),
+    [('8; jpeg', 1, '.jpg'), ('8; png', 1, '.png'), ('16; png', 256, '.png')],
+)
+def test_a_compressed_bayer_pattern_gives_the_colors_back(pattern, kind, scale, suffix):
+    sensor = mosaic(pattern, np.uint16) * scale
+    sensor = sensor.astype(np.uint8) if scale == 1 else sensor
+    array, name = from_jpeg(compressed(sensor, f'bayer_{pattern}{kind} compressed ', suffix))
+    assert name == 'bgr8'
+    # JPEG blurs the mosaic; what is grey in all channels would be off by tens.
+    levels = 40 if suffix == '.jpg' else 0
+    for columns in (slice(2, 4), slice(-4, -2)):
+        difference = array[2:-2, columns].astype(int) - COLORS[2:-2, columns]
+        assert np.abs(difference.mean(axis=(0, 1))).max() <= levels
+
+
+@pytest.mark.parametrize(
+    ('form', 'name'),
+    [
+        ('', 'bgr8'),
+        ('jpeg', 'bgr8'),
+        ('png', 'bgr8'),
+        ('bgr8; png compressed bgr8', 'bgr8'),
+        ('rgb8; png compressed bgr8', 'bgr8'),
+        ('rgba8; png compressed bgr8', 'bgr8'),
+        ('bgr8; png compressed rgb8', 'rgb8'),
+        ('8UC3; png compressed ', 'bgr8'),
+        ('bgr16; png compressed bgr16', 'bgr8'),
+        ('mono8; png compressed ', 'mono8'),
+        ('mono16; png compressed ', 'mono8'),
+        ('8UC1; png compressed ', 'mono8'),
+    ],
+)
+def test_the_format_says_what_was_compressed(form, name):
+    image = COLORS[..., 0] if name == 'mono8' else COLORS
+    if '16' in form:
+        image = image.astype(np.uint16) * 256 + 77
+    array, told = from_jpeg(compressed(image, form))
+    assert told == name
+    np.testing.assert_array_equal(array, image // 256 if '16' in form else image)
+
+
+def test_a_compressed_bayer_pattern_needs_whole_blocks():
+    with pytest.raises(ImageFormatError, match=r'11x8 px in bayer_rggb8; .* even size'):
+        from_jpeg(compressed(COLORS[:, :11, 0], 'bayer_rggb8; png compressed '))
 
 
 @pytest.mark.parametrize('data', [b'', b'no picture', b'\xff\xd8\xff'])

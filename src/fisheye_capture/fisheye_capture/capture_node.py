@@ -30,7 +30,9 @@ class CaptureNode(Node):
         self._declared = Parameters(self, CaptureSettings)
         name = self.get_namespace().rsplit('/', 1)[-1] or 'camera'
         self._settings = self._declared.settings.named(name)
-        self._calibration_path = calibration_path(self._settings.camera_info_url)
+        self._calibration_path = calibration_path(
+            self._settings.camera_info_url, self._settings.camera_name
+        )
         self._image = ImagePublisher(self, 'image_raw')
         self._camera_info = self.create_publisher(CameraInfo, 'camera_info', IMAGE)
         self._info, self._described, self._fault = CameraInfo(), None, ''
@@ -90,6 +92,8 @@ class CaptureNode(Node):
             if self._calibration_path is None:
                 raise CameraFileError('camera_info_url is empty; expected the file to write')
             camera = camera_of(request.camera_info, self._settings.camera_name)
+            if self._described and (misfit := camera.misfit(*self._described[1:])):
+                raise CameraFileError(misfit)
             write_camera(self._calibration_path, camera)
         except FisheyeError as error:
             response.success, response.status_message = False, str(error)

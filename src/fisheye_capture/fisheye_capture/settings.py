@@ -55,7 +55,9 @@ class CameraSettings:
         'or an http, rtsp or udp URL; for panorama_node also topic: another node reads it.',
     )
     camera_info_url: str = setting(
-        '', 'Calibration file: a path, file:// or package://; empty: none (synthetic: its own).'
+        '',
+        'Calibration file: a path, file:// or package://; ${ROS_HOME} and ${NAME} (of the camera) '
+        'are filled in; empty: none (synthetic: its own).',
     )
     camera_name: str = setting('', 'Name of the camera; empty: the last part of the namespace.')
     frame_id: str = setting('', 'Frame of the pictures; empty: the name and _optical_frame.')

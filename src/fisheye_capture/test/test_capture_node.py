@@ -262,6 +262,51 @@ def test_nonsense_is_never_written(ros, write_picture, tmp_path):
     assert not path.exists()
 
 
+@pytest.mark.parametrize(
+    ('change', 'words'),
+    [
+        (lambda m: m.r.__setitem__(4, np.nan), 'R holds nan; expected finite numbers'),
+        (lambda m: m.p.__setitem__(3, np.inf), 'P holds inf; expected finite numbers'),
+        (lambda m: m.k.__setitem__(2, -1e6), 'center_x_px is -1e+06; expected it within'),
+        (lambda m: m.k.__setitem__(0, np.nan), 'focal_x_px is nan; expected'),
+        (lambda m: m.d.__setitem__(0, np.nan), 'finite numbers'),
+        (
+            lambda m: setattr(m, 'width', 64),
+            'the calibration is for 64x24 px; the pictures have 32x24 px',
+        ),
+        (
+            lambda m: setattr(m, 'binning_x', 2),
+            'the calibration is for 16x24 px; the pictures have 32x24 px',
+        ),
+        (lambda m: setattr(m.roi, 'x_offset', 1), 'roi has 32 px from 1 on along x'),
+    ],
+)
+def test_what_the_next_start_would_refuse_is_never_written(
+    ros, write_picture, tmp_path, change, words
+):
+    path = tmp_path / 'left.yaml'
+    ros.start(source=str(write_picture('one.png', 7)), camera_info_url=str(path))
+    ros.hear('/left/camera_info')
+    message = camera_info_of(Camera('left', SMALL), Header())
+    change(message)
+    answer = ros.call(message)
+    assert not answer.success
+    assert words in answer.status_message
+    assert not path.exists()
+
+
+def test_the_usual_place_of_calibrations_is_written_and_read(
+    ros, write_picture, tmp_path, monkeypatch
+):
+    monkeypatch.setenv('ROS_HOME', str(tmp_path))
+    url = 'file://${ROS_HOME}/camera_info/${NAME}.yaml'
+    ros.start(source=str(write_picture('one.png', 7)), camera_info_url=url)
+    ros.hear('/left/camera_info')
+    answer = ros.call(camera_info_of(Camera('left', SMALL), Header()))
+    assert answer.status_message == f'written to {tmp_path}/camera_info/left.yaml'
+    assert read_camera(tmp_path / 'camera_info' / 'left.yaml').lens == SMALL
+
+
 def test_a_camera_that_is_not_there_is_an_error_in_the_diagnostics(ros):
     ros.start(source=97, reconnect_max_s=0.1)
     status = ros.hear('/diagnostics').status[0]

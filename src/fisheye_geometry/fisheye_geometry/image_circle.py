@@ -11,6 +11,8 @@ _LIT, _UNLIT = 0.5, 0.15
 _RING_RAD = np.radians(0.4)
 _EDGE_RINGS = 3
 """Rings that the edge of the circle may blur."""
+_CUT = 0.02
+"""Share of a picture: more of it than that is lit where the lens maps nothing."""
 _COLUMNS = 640
 """Columns that are enough to measure the circle."""
 
@@ -25,6 +27,8 @@ class ImageCircle:
     ----------
     angle_rad : float
         Radius of the circle, rad; the lens's `max_angle_rad` where none was found.
+    is_cut : bool
+        Whether pictures were lit where the lens maps nothing: its distortion ends too early.
     """
 
     def __init__(self, lens: Lens):
@@ -35,7 +39,9 @@ class ImageCircle:
         angle = np.arccos(rays[..., 2].clip(-1, 1))
         self._ring = np.where(seen, angle // _RING_RAD, 0).astype(np.intp).ravel()
         self._pixels = np.bincount(self._ring)
+        self._unseen = ~seen.ravel()
         self._found = False
+        self.is_cut = False
         self.angle_rad = lens.max_angle_rad
 
     def look(self, image: np.ndarray) -> bool:
@@ -45,7 +51,9 @@ class ImageCircle:
         image = image[:: self._step, :: self._step]
         # One channel is enough, and green has the least noise.
         bright = (image if image.ndim == 2 else image[..., 1]) > _DARK_LEVEL
-        lit = np.bincount(self._ring, bright.ravel()) / np.maximum(self._pixels, 1)
+        bright = bright.ravel()
+        self.is_cut = self.is_cut or bright[self._unseen].sum() > _CUT * bright.size
+        lit = np.bincount(self._ring, bright) / np.maximum(self._pixels, 1)
         rings = np.flatnonzero(lit >= _LIT)
         if not len(rings):
             return False
@@ -75,6 +83,18 @@ class SeenLens:
     def lens(self) -> Lens:
         """The lens within its circle."""
         return self._lens.seen_within(self._circle.angle_rad)
+
+    @property
+    def note(self) -> str:
+        """What a user should know of the lens; '' for nothing."""
+        if not self._circle.is_cut:
+            return ''
+        end_deg = np.degrees(self._lens.max_angle_rad)
+        return (
+            f'the distortion of the lens ends {end_deg:.1f} degrees off its axis, where the '
+            f'pictures go on: they are cut to {2 * end_deg:.0f} degrees; calibrate with views '
+            'that reach the edge'
+        )
 
     def look(self, image: np.ndarray) -> bool:
         """Learn from the next picture (height, width[, channels]); whether `lens` may be news."""

@@ -60,3 +60,30 @@ def test_the_circle_of_a_lens_is_looked_for_ever_more_seldom():
     told = [seen.look(picture(70, 120, 3)) for _ in range(3)]
     assert told == [True, False, False]
     assert seen.lens.max_angle_rad < whole.max_angle_rad
+
+
+ENDING = make_lens('equidistant', 640, 480, [250, 0, 320, 0, 250, 240, 0, 0, 1], [-0.45, 0, 0, 0])
+"""Its radius grows up to 49.3 degrees, 0.57 focal lengths: 143 px."""
+
+
+def test_a_lens_that_ends_within_its_pictures_is_told():
+    seen = SeenLens(ENDING)
+    seen.look(np.zeros((480, 640, 3), np.uint8))
+    assert seen.note == '', 'a dark picture may be one within its circle'
+    seen.look(np.full((480, 640, 3), 120, np.uint8))
+    assert 'ends 49.3 degrees off its axis' in seen.note
+    assert 'cut to 99 degrees' in seen.note
+    seen.look(np.zeros((480, 640, 3), np.uint8))
+    seen.look(np.zeros((480, 640, 3), np.uint8))
+    assert seen.note, 'it stays true at night'
+
+
+def test_a_lens_whose_circle_ends_first_is_not_told():
+    seen = SeenLens(ENDING)
+    y, x = np.mgrid[0:480, 0:640]
+    circle = 200 * (np.hypot(x - 320, y - 240) < 140)
+    assert seen.look(circle.astype(np.uint8))
+    assert seen.note == ''
+    seen = SeenLens(LENS)
+    assert seen.look(picture(180, 120, 3))
+    assert seen.note == ''

@@ -11,10 +11,11 @@ from image_message import to_message
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
-from sensor_msgs.msg import CameraInfo, Image
+from sensor_msgs.msg import CameraInfo, Image, RegionOfInterest
 from std_msgs.msg import Header
 
 from fisheye_bridge.camera_info import camera_info_of
+from fisheye_bridge.diagnostics import Report
 from fisheye_bridge.images import to_array
 from fisheye_bridge.projection import surface_of
 from fisheye_bridge.qos import IMAGE, LATCHED
@@ -71,6 +72,12 @@ class Bench:
             self.send(**sending)
             for _ in range(6):
                 self._executor.spin_once(timeout_sec=0.01)
+
+    def told(self):
+        """Return what the node warns of in its diagnostics."""
+        report = Report()
+        self.node._report(report)
+        return '; '.join(report.reasons)
 
     def close(self):
         self._executor.shutdown()
@@ -152,6 +159,42 @@ def test_a_nonsense_camera_info_leaves_the_good_one_in_use(make_bench, wrong):
     assert len(bench.projections) == 1
 
 
+def test_a_binned_and_cropped_camera_is_corrected_like_the_whole_one(make_bench):
+    whole = make_lens(
+        'equidistant', 400, 300, [108, 0, 209.5, 0, 108, 149.5, 0, 0, 1], [0, 0, 0, 0]
+    )
+    roi = RegionOfInterest(x_offset=50, y_offset=30, width=320, height=240)
+    bench = make_bench()
+    bench.until(
+        lambda: bench.pictures and bench.projections,
+        'a corrected picture',
+        lens=whole,
+        binning_x=2,
+        binning_y=2,
+        roi=roi,
+    )
+    assert surface_of(bench.projections[-1]) == UndistortSettings().surface_of(LENS)
+
+
+def test_a_binning_that_does_not_fit_the_pictures_is_named(make_bench):
+    bench = make_bench()
+    bench.until(lambda: bench.pictures, 'a picture')
+    bench.until(lambda: bench.told(), 'the refusal', binning_x=4)
+    assert bench.told() == (
+        'camera_info refused: 40x120 px (160x120 px with binning 4x1, roi all at (0, 0)) do not '
+        'fit the pictures, which have 160x120 px'
+    )
+
+
+def test_a_lens_that_ends_within_its_pictures_is_told(make_bench):
+    ending = make_lens(
+        'equidistant', 160, 120, [60, 0, 79.5, 0, 60, 59.5, 0, 0, 1], [-0.45, 0, 0, 0]
+    )
+    bench = make_bench()
+    bench.until(lambda: 'ends' in bench.told(), 'the note', lens=ending)
+    assert 'camera_info: the distortion of the lens ends 49.3 degrees off its axis' in bench.told()
+
+
 def test_a_dark_rim_is_known_before_the_first_projection_is_told(make_bench):
     y, x = np.mgrid[:120, :160]
     circle = np.where(np.hypot(x - 79.5, y - 59.5) < 50, 200, 0).astype(np.uint8)
@@ -170,7 +213,7 @@ def test_unusable_pictures_are_dropped_and_counted(make_bench):
     bench = make_bench()
     bench.until(lambda: bench.pictures, 'a picture')
     small = np.zeros((12, 16, 3), np.uint8)
-    for sending in ({'encoding': 'mono16'}, {'picture': small}, {'encoding': 'bgra8'}):
+    for sending in ({'encoding': '16UC1'}, {'picture': small}, {'encoding': 'bgra8'}):
         refused = bench.node._camera.pictures.dropped.count
         bench.until(
             lambda before=refused: bench.node._camera.pictures.dropped.count > before,

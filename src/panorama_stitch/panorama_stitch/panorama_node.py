@@ -93,7 +93,8 @@ class _OwnEye(_Eye):
         self._settings = CaptureSettings(**named, **shared)
         self._raw = ImagePublisher(node, f'{name}/image_raw')
         self._grabber = Grabber(self._settings, self._take, on_change=self._tell)
-        camera = calibration_of(self._settings.camera_info_url) or self._grabber.camera
+        url, called = self._settings.camera_info_url, self._settings.camera_name
+        camera = calibration_of(url, called) or self._grabber.camera
         if camera is None:
             shown = shown_source(own.source)
             raise CameraFileError(
@@ -123,6 +124,7 @@ class _OwnEye(_Eye):
             (ERROR, grabber.complaint),
             (WARN, grabber.note),
             (ERROR, self._fault),
+            (WARN, self._seen.note),
         ):
             if sentence:
                 report.add(level, f'{self._name}: {sentence}')
@@ -139,8 +141,11 @@ class _OwnEye(_Eye):
         except FisheyeError as error:
             self._broken.add(error)
             return
+        noted = self._seen.note
         if self._seen.look(image):
             self.place(self._node.settings)
+        if self._seen.note and not noted:
+            self._node.warn(f'{self._name}: {self._seen.note}')
         self._node.take(self._name, frame.stamp_ns, image, encoding)
         if self._raw.wanted:
             header = Header(stamp=stamp_of(frame.stamp_ns), frame_id=self._settings.frame_id)
