@@ -1,6 +1,7 @@
 """ROS parameters declared from a settings dataclass, checked and kept up to date."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from difflib import get_close_matches
 from typing import Any
@@ -12,6 +13,7 @@ from rcl_interfaces.msg import (
     SetParametersResult,
 )
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
 from fisheye_geometry.errors import FisheyeError
 from fisheye_geometry.settings import Rule, convert, describe_range, rules
@@ -67,10 +69,34 @@ class Parameters:
             anything = ParameterDescriptor(dynamic_typing=True)
             parameter = node.declare_parameter(full_name, start, anything)
             values[name] = convert(full_name, parameter.value, kind, rule)
+            typed = _typed(full_name, values[name])
+            if typed.type_ != parameter.type_:
+                node.set_parameters([typed])
             # Only now, because rclpy would refuse what is out of range in its own words.
             node.set_descriptor(full_name, _descriptor(rule, kind))
         self.settings = settings(**values)
+        # rclpy would hand on what each of several callbacks returns: there is one for all.
+        groups = vars(node).setdefault('_parameter_groups', [])
+        if not groups:
+            node.add_pre_set_parameters_callback(
+                lambda given: [_retyped(parameter, groups) for parameter in given]
+            )
+        groups.append(self)
         node.add_on_set_parameters_callback(self._set)
+
+    def typed(self, parameter: Parameter) -> Parameter | None:
+        """Return a parameter with the type of its setting; None if it is none of these.
+
+        Raises
+        ------
+        SettingError
+            If the value is not possible.
+        """
+        name = parameter.name.removeprefix(self._prefix)
+        if parameter.name != self._prefix + name or name not in self._rules:
+            return None
+        kind, _, rule = self._rules[name]
+        return _typed(parameter.name, convert(parameter.name, parameter.value, kind, rule))
 
     def _set(self, parameters) -> SetParametersResult:
         changes = {}
@@ -89,6 +115,19 @@ class Parameters:
         except FisheyeError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
+
+
+def _typed(name: str, value: Any) -> Parameter:
+    return Parameter(name, value=list(value) if isinstance(value, tuple) else value)
+
+
+def _retyped(parameter: Parameter, groups: list[Parameters]) -> Parameter:
+    """Give a parameter its setting's type: what is asked for later has the type of the default."""
+    for group in groups:
+        with suppress(FisheyeError):  # refused with its sentence later on
+            if typed := group.typed(parameter):
+                return typed
+    return parameter
 
 
 def misspelt(node: Node) -> str:

@@ -5,12 +5,13 @@ from math import isnan, nan
 
 import pytest
 import rclpy
+import yaml
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from fisheye_bridge.parameters import Parameters, misspelt
 from fisheye_geometry.errors import OverlapError, SettingError
-from fisheye_geometry.settings import setting
+from fisheye_geometry.settings import rules, setting
 
 
 @dataclass(frozen=True)
@@ -21,6 +22,9 @@ class Example:
     source: str = setting('synthetic', 'Where pictures come from.')
     blend: str = setting('feather', 'How.', choices=('none', 'feather'), live=True)
     offset_px: tuple[float, ...] = setting((nan,), 'Offset.', nan=True, live=True)
+    angle_deg: float = setting(nan, 'Angle.', minimum=-90.0, maximum=90.0, nan=True, live=True)
+    count: int = setting(50, 'How many.', minimum=1, maximum=100, live=True)
+    views: tuple[str, ...] = setting((), 'Names.', live=True)
 
 
 @pytest.fixture
@@ -93,6 +97,46 @@ def test_live_changes_apply_and_bad_ones_do_not(make_node):
     assert seen == ['none']
     assert change(node, 'offset_px', nan).successful
     assert seen == ['none'], 'NaN for NaN is no change'
+
+
+def test_a_parameter_keeps_its_type(make_node):
+    node = make_node(rate_hz=15, source=0, offset_px=545)
+    Parameters(node, Example, prefix='other.')
+    Parameters(node, Example)
+    kinds = {'rate_hz': Parameter.Type.DOUBLE, 'source': Parameter.Type.STRING}
+    kinds['offset_px'] = Parameter.Type.DOUBLE_ARRAY
+    assert {name: node.get_parameter(name).type_ for name in kinds} == kinds
+    assert change(node, 'rate_hz', 20).successful
+    assert change(node, 'count', 5.0).successful
+    assert change(node, 'offset_px', 7).successful
+    assert node.get_parameter('count').value == 5
+    assert node.get_parameter('count').type_ == Parameter.Type.INTEGER
+    assert {name: node.get_parameter(name).type_ for name in kinds} == kinds
+    assert change(node, 'use_sim_time', True).successful
+
+
+def test_what_was_dumped_can_be_loaded(make_node):
+    node = make_node()
+    parameters = Parameters(node, Example)
+    for name, (_, default, rule) in rules(Example).items():
+        if rule.live:
+            value = list(default) if isinstance(default, tuple) else default
+            # `ros2 param dump` writes YAML, `load` reads it and hands on its words as YAML again.
+            loaded = yaml.safe_load(str(yaml.safe_load(yaml.safe_dump(value))))
+            assert change(node, name, loaded).successful, name
+            assert repr(getattr(parameters.settings, name)) == repr(default)
+            assert node.get_parameter(name).type_ == Parameter.Type.from_parameter_value(value)
+
+
+def test_a_list_of_nothing_is_refused(make_node):
+    node = make_node()
+    Parameters(node, Example)
+    result = change(node, 'offset_px', [])
+    assert (result.successful, result.reason) == (
+        False,
+        'offset_px is empty; expected at least one value',
+    )
+    assert change(node, 'views', []).successful
 
 
 def test_the_node_may_refuse_with_a_sentence(make_node):

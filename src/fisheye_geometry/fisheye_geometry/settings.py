@@ -6,7 +6,7 @@ its unit.
 """
 
 from dataclasses import MISSING, dataclass, field, fields
-from math import isfinite, isnan
+from math import isfinite, isnan, nan
 from typing import Any, get_args, get_origin, get_type_hints
 
 from fisheye_geometry.errors import SettingError
@@ -24,13 +24,15 @@ class Rule:
     """Whether a change applies while the node runs."""
     nan: bool = False
     """Whether NaN is a value, with the meaning that `help` gives."""
+    empty: bool = False
+    """Whether a list may have nothing in it."""
 
 
 def setting(default: Any, help: str, **rule) -> Any:
     """Declare a field of a settings dataclass; `rule` as in `Rule`."""
     if isinstance(default, list):
         raise TypeError('a default must not be mutable: use a tuple')
-    return field(default=default, metadata={'rule': Rule(help, **rule)})
+    return field(default=default, metadata={'rule': Rule(help, empty=default == (), **rule)})
 
 
 def rules(settings: type) -> dict[str, tuple[type, Any, Rule]]:
@@ -47,7 +49,7 @@ def convert(name: str, value: Any, kind: type, rule: Rule) -> Any:
     """Turn a value that a user gave into the setting's type, and check it.
 
     What can be meant only one way is taken: a whole number for a float or a string, one value
-    where a list is expected.
+    where a list is expected, the word that `ros2 param load` makes of NaN.
 
     Raises
     ------
@@ -57,7 +59,11 @@ def convert(name: str, value: Any, kind: type, rule: Rule) -> Any:
     if get_origin(kind) is tuple:
         (item, _) = get_args(kind)
         values = value if isinstance(value, (list, tuple)) or hasattr(value, 'tolist') else [value]
+        if not len(values) and not rule.empty:
+            raise SettingError(f'{name} is empty; expected at least one value')
         return tuple(convert(name, one, item, rule) for one in values)
+    if kind is float and value in _NAN_WORDS:
+        value = nan
     whole = isinstance(value, int) and not isinstance(value, bool)
     if kind is float and (whole or isinstance(value, float)):
         return _within(name, float(value), rule)
@@ -70,6 +76,7 @@ def convert(name: str, value: Any, kind: type, rule: Rule) -> Any:
     raise SettingError(f'{name} is {value!r}; expected {_TYPE_NAMES[kind]}')
 
 
+_NAN_WORDS = 'nan', '.nan', 'NaN', '.NaN'
 _TYPE_NAMES = {float: 'a number', int: 'a whole number', bool: 'true or false', str: 'text'}
 
 
