@@ -49,35 +49,57 @@ class Link:
         The two machines.
     """
 
-    _DEVICE = 'link0'
-
-    def __init__(self):
+    def __init__(self, *, is_plugged: bool = True):
         kinds = 'mount', 'net'
         prepare = 'mount -t tmpfs tmpfs /dev/shm && ip link set lo up'
         self.robot, self.base = Namespace(kinds, prepare), Namespace(kinds, prepare)
-        ends = [('name', self._DEVICE, 'netns', str(end.pid)) for end in (self.robot, self.base)]
-        self._ip('link', 'add', *ends[0], 'type', 'veth', 'peer', *ends[1])
-        for number, end in enumerate((self.robot, self.base), 1):
-            address = f'10.77.0.{number}/24'
-            self._ip('address', 'add', address, 'dev', self._DEVICE, prefix=end.prefix)
-            self._ip('link', 'set', self._DEVICE, 'up', prefix=end.prefix)
+        self._device, self._network = 'link77', 77
+        self._lay()
+        if is_plugged:
+            self.mend()
 
     def __enter__(self) -> 'Link':
         return self
 
     def __exit__(self, *_) -> None:
         with suppress(subprocess.CalledProcessError):
-            self._ip('link', 'delete', self._DEVICE, prefix=self.robot.prefix)
+            self._ip('link', 'delete', self._device, prefix=self.robot.prefix)
         self.robot.__exit__()
         self.base.__exit__()
 
     def cut(self) -> None:
         """Pull the cable."""
-        self._ip('link', 'set', self._DEVICE, 'down', prefix=self.robot.prefix)
+        self._ip('link', 'set', self._device, 'down', prefix=self.robot.prefix)
 
     def mend(self) -> None:
-        """Plug it in again."""
-        self._ip('link', 'set', self._DEVICE, 'up', prefix=self.robot.prefix)
+        """Plug it in, again or for the first time."""
+        self._ip('link', 'set', self._device, 'up', prefix=self.robot.prefix)
+
+    def readdress(self, end: Namespace) -> None:
+        """Have one of the machines get another address."""
+        former, self._hosts[end] = self._address(end), self._hosts[end] + 10
+        self._ip('address', 'delete', former, 'dev', self._device, prefix=end.prefix)
+        self._ip('address', 'add', self._address(end), 'dev', self._device, prefix=end.prefix)
+
+    def replace(self) -> None:
+        """Take the cable away and lay another one, in another network, as from Wi-Fi to LTE."""
+        self._ip('link', 'delete', self._device, prefix=self.robot.prefix)
+        self._network += 1
+        self._device = f'link{self._network}'
+        self._lay()
+        self.mend()
+
+    def _lay(self) -> None:
+        """Lay a cable that is plugged in at the base only."""
+        self._hosts = {self.robot: 1, self.base: 2}
+        ends = [('name', self._device, 'netns', str(end.pid)) for end in self._hosts]
+        self._ip('link', 'add', *ends[0], 'type', 'veth', 'peer', *ends[1])
+        for end in self._hosts:
+            self._ip('address', 'add', self._address(end), 'dev', self._device, prefix=end.prefix)
+        self._ip('link', 'set', self._device, 'up', prefix=self.base.prefix)
+
+    def _address(self, end: Namespace) -> str:
+        return f'10.{self._network}.0.{self._hosts[end]}/24'
 
     def _ip(self, *words, prefix=()) -> None:
         subprocess.run([*prefix, 'ip', *words], check=True)

@@ -3,6 +3,7 @@
 import os
 import sys
 import time
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,9 @@ LONG = bool(os.environ.get('LONG'))
 RATE_HZ = 30.0
 WATCHED_S = 30.0 if LONG else 5.0
 SETTLE_S = 2.0
+AWAKE_S = 4.0
+"""In which also the nodes at the base have started."""
+TIMES = 10 if LONG else 2
 CUTS_S = (5.0, 30.0) if LONG else (5.0,)
 OLD_MS = 1000.0
 """A picture that waited somewhere while the cable was out would be seconds old."""
@@ -21,12 +25,14 @@ SCHEDULING = 0.2
 """Share of the frames that a busy machine may not even take."""
 MAY_LOSE = 0.0 if LONG else 0.03
 """Share of the pairs that a busy machine may lose; the long form wants a quiet one."""
+MAY_TAKE_S = RETURN_S if LONG else 2 * RETURN_S
+"""Until pictures come over a link that changed; likewise."""
 BASES = {'five nodes': ('left/undistort', 'right/undistort', 'stitch'), 'two': ('panorama',)}
 
 
-@pytest.fixture
-def link():
-    with Link() as link:
+@pytest.fixture(params=[True], ids=['plugged'])
+def link(request):
+    with Link(is_plugged=request.param) as link:
         yield link
 
 
@@ -114,3 +120,37 @@ def test_a_link_carries_every_pair_and_comes_back_when_it_was_cut(rig, link, nod
         assert back_s < RETURN_S
         assert max(delays) < OLD_MS, 'old pictures were queued up'
         assert len(due - came) <= MAY_LOSE * len(due)
+
+
+def longest_gap_s(rig, what):
+    """Let `what` just done to the link take effect; return how long no panorama came, s."""
+    begin_ns = time.time_ns()
+    end_ns = begin_ns + int(MAY_TAKE_S * 1e9)
+    wait_for(
+        lambda: rig.check_alive() or came_after(rig, end_ns), START_S, f'a panorama after {what}'
+    )
+    moments = [begin_ns, *sorted(came_after(rig, begin_ns))]
+    gap_s = max(after - before for before, after in pairwise(moments)) / 1e9
+    print(f'{what}: no panorama for {gap_s:.2f} s')
+    return gap_s
+
+
+@pytest.mark.parametrize('link', [False], indirect=True, ids=['unplugged'])
+@pytest.mark.parametrize('nodes', BASES.values(), ids=BASES)
+def test_a_link_that_comes_late_or_changes_carries_pictures(rig, link, nodes):
+    start(rig, link, nodes)
+    wait_for(lambda: rig.check_alive() or all(heard(rig, s) for s in SIDES), START_S, 'frames')
+    ready_s = time.monotonic() + AWAKE_S
+    wait_for(lambda: rig.check_alive() or time.monotonic() > ready_s, START_S, 'the base')
+    assert not heard(rig, 'panorama'), 'nothing is plugged in'
+    link.mend()
+    gaps_s = [longest_gap_s(rig, 'the link came up')]
+    for _ in range(TIMES):
+        for name, change in (
+            ('the robot changed its address', lambda: link.readdress(link.robot)),
+            ('the base changed its address', lambda: link.readdress(link.base)),
+            ('another link took its place', link.replace),
+        ):
+            change()
+            gaps_s.append(longest_gap_s(rig, name))
+    assert max(gaps_s) < MAY_TAKE_S, gaps_s

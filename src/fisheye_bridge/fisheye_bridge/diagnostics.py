@@ -8,11 +8,16 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
+from fisheye_bridge.hearing import TOPIC, Hearing
+from fisheye_bridge.qos import HEARTBEAT
 from fisheye_geometry.errors import FisheyeError
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 WARNING_PAUSE_S = 5.0
 """Between two warnings of the same kind in the log."""
+_CONTAINERS = (
+    '(nodes in several containers of one machine must share /dev/shm: docker run --ipc=host)'
+)
 _SHED_SHARE = 0.1
 """Of what comes; less is not worth a warning."""
 
@@ -87,7 +92,8 @@ class Diagnostics:
         """Start; `fill` is called with an empty report each second."""
         self._node = node
         self._fill = fill
-        self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self._publisher = node.create_publisher(DiagnosticArray, TOPIC, HEARTBEAT)
+        self._hearing = Hearing(node)
         # A node is heard while a recording, and with it the time of ROS, stands still.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._timer = node.create_timer(1.0, self._publish, clock=steady)
@@ -95,6 +101,8 @@ class Diagnostics:
     def _publish(self) -> None:
         report = Report()
         self._fill(report)
+        if silence := self._hearing.silence():
+            report.add(WARN, f'{silence} {_CONTAINERS}')
         name = self._node.get_fully_qualified_name()
         status = DiagnosticStatus(
             level=report.level,

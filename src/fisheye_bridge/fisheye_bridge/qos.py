@@ -1,5 +1,6 @@
 """Quality of service, one profile for each kind of topic."""
 
+from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
@@ -16,6 +17,9 @@ LATCHED = QoSProfile(
     depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
 """State: who comes later still gets the last one."""
+
+HEARTBEAT = QoSProfile(depth=10, deadline=Duration(seconds=3))
+"""What comes once a second, and promises to."""
 
 ADJUSTABLE = QoSOverridingOptions((QoSPolicyKind.RELIABILITY, QoSPolicyKind.DEPTH))
 """What a parameter such as `qos_overrides.TOPIC.subscription.depth` may change."""

@@ -14,10 +14,13 @@ from rclpy.exceptions import ParameterException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.logging import get_logger
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 
 from fisheye_bridge import shared_memory
 from fisheye_bridge.command_line import refuse_words, usage
+from fisheye_bridge.hearing import Hearing
+from fisheye_bridge.network import Links, forget_machine, refresher
 from fisheye_bridge.parameters import misspelt
 from fisheye_geometry.errors import FisheyeError
 
@@ -27,6 +30,8 @@ _LONGEST_WAIT_S = 0.2
 """A signal is noticed after so long at the latest."""
 _LONGEST_END_S = 1.2
 """What is still in work so long after it, as a calibration, is left undone."""
+_TRIES = 3
+"""So often at most a node that hears nobody connects anew."""
 
 
 def run(node_class: type[Node]) -> int:
@@ -45,44 +50,96 @@ def run(node_class: type[Node]) -> int:
     if text := usage(node_class):
         print(text)
         return 0
-    node = executor = None
     threading.excepthook = _give_up
-    ended = threading.Event()
+    return _Process(node_class).run()
 
-    def end(*_):
-        if ended.is_set():
+
+class _Process:
+    """A node from its start to its end; connected anew where the others cannot reach it."""
+
+    def __init__(self, node_class: type[Node]):
+        self._node_class = node_class
+        self._node: Node | None = None
+        self._parameters: list[Parameter] = []
+        self._tries = 0
+        self._ended = threading.Event()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._end)
+
+    def run(self) -> int:
+        """Return the exit code."""
+        try:
+            refuse_words()
+            while not self._ended.is_set():
+                self._live()
+        except KeyboardInterrupt:
+            pass
+        except (FisheyeError, ParameterException, rclpy._rclpy_pybind11.RCLError) as error:
+            _logger(self._node_class).fatal(str(error))
+            return 1
+        finally:
+            rclpy.try_shutdown()
+        return 0
+
+    def _live(self) -> None:
+        """Spin a node until the end, or until it has to connect anew."""
+        executor = None
+        links = Links()
+        _init(self._node_class)
+        try:
+            self._node = node = self._built()
+            executor = SingleThreadedExecutor()
+            executor.add_node(node)
+            refresh, hearing = refresher(node), Hearing(node)
+            while not self._ended.is_set():
+                executor.spin_once(timeout_sec=_LONGEST_WAIT_S)
+                reason = links.changed(refresh)
+                if not reason and self._tries < _TRIES and (reason := hearing.silence()):
+                    self._tries += 1
+                if reason:
+                    node.get_logger().warning(f'{reason}: connecting anew')
+                    break
+        finally:
+            if executor:
+                executor.shutdown()
+            if self._node:
+                names = self._node.get_parameters_by_prefix('')
+                self._parameters = self._node.get_parameters(list(names))
+                self._node.destroy_node()
+                self._node = None
+            rclpy.try_shutdown()
+            forget_machine()
+
+    def _built(self) -> Node:
+        """Build the node, with the parameters that it had before."""
+        if self._parameters:
+            return self._node_class(parameter_overrides=self._parameters)
+        node = self._node_class()
+        if complaint := misspelt(node):
+            node.get_logger().warning(complaint)
+        return node
+
+    def _end(self, *_) -> None:
+        if self._ended.is_set():
             return
-        ended.set()
+        self._ended.set()
         guard = threading.Timer(_LONGEST_END_S, os._exit, (0,))
         guard.daemon = True
         guard.start()
-        if node is None:
+        if self._node is None:
             raise KeyboardInterrupt  # it may take seconds until a node is built
 
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, end)
+
+def _logger(node_class: type[Node]):
+    """Return a logger with the name of a node that could not be made."""
+    name = node_class.__module__.rpartition('.')[2].removesuffix('_node')
     try:
-        refuse_words()
-        _init(node_class)
-        node = node_class()
-        if complaint := misspelt(node):
-            node.get_logger().warning(complaint)
-        executor = SingleThreadedExecutor()
-        executor.add_node(node)
-        while not ended.is_set():
-            executor.spin_once(timeout_sec=_LONGEST_WAIT_S)
-    except KeyboardInterrupt:
-        pass
-    except (FisheyeError, ParameterException, rclpy._rclpy_pybind11.RCLError) as error:
-        get_logger(node_class.__name__).fatal(str(error))
-        return 1
-    finally:
-        if executor:
-            executor.shutdown()
-        if node:
-            node.destroy_node()
         rclpy.try_shutdown()
-    return 0
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        nameless = Node(name, start_parameter_services=False, enable_rosout=False)
+    except (rclpy._rclpy_pybind11.RCLError, RuntimeError, ValueError):
+        return get_logger(name)
+    return nameless.get_logger()
 
 
 @contextmanager

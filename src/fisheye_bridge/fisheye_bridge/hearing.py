@@ -1,0 +1,63 @@
+"""Whether a node hears the others: a process that is started again may stay deaf.
+
+Another process that touches the shared memory of a killed one in the wrong moment can keep its
+successor from opening it. The successor then sees the others, and nothing from them arrives.
+"""
+
+from collections.abc import Callable
+from time import monotonic
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.node import Node
+
+TOPIC = '/diagnostics'
+DEAF_S = 4.0
+"""Within this time several reports of each node are due."""
+_LOOK_S = 0.5
+_DEPTH = 10
+_ENDLESS_S = 1e6
+
+
+class Hearing:
+    """Listens to the reports of other nodes until the first one comes.
+
+    Only publishers that promise a report by their deadline count: those of our nodes.
+    """
+
+    def __init__(self, node: Node, now_s: Callable[[], float] = monotonic):
+        self._node, self._now_s = node, now_s
+        self._name = node.get_fully_qualified_name()
+        self._since_s: dict[bytes, float] = {}
+        self._due_s = 0.0
+        self._subscription = node.create_subscription(DiagnosticArray, TOPIC, self._take, _DEPTH)
+
+    def silence(self) -> str:
+        """Return who can be seen, for some seconds, and is not heard; '' if all is well."""
+        now_s = self._now_s()
+        if self._subscription is None or now_s < self._due_s:
+            return ''
+        self._due_s = now_s + _LOOK_S
+        others = {bytes(end.endpoint_gid): _name(end) for end in self._others()}
+        self._since_s = {gid: self._since_s.get(gid, now_s) for gid in others}
+        silent = {
+            others[gid] for gid, since_s in self._since_s.items() if now_s - since_s > DEAF_S
+        }
+        names = ', '.join(sorted(name.lstrip('/') for name in silent))
+        return f'{names} can be seen, but nothing comes from there' if names else ''
+
+    def _others(self) -> list:
+        """Return who else promises reports."""
+        return [
+            end
+            for end in self._node.get_publishers_info_by_topic(TOPIC)
+            if end.qos_profile.deadline.nanoseconds < _ENDLESS_S * 1e9 and _name(end) != self._name
+        ]
+
+    def _take(self, message: DiagnosticArray) -> None:
+        if self._subscription and any(s.hardware_id != self._name for s in message.status):
+            self._node.destroy_subscription(self._subscription)
+            self._subscription = None
+
+
+def _name(end) -> str:
+    return f'{end.node_namespace.rstrip("/")}/{end.node_name}'

@@ -1,0 +1,74 @@
+"""Whom a node can see and does not hear."""
+
+from time import monotonic
+
+import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.executors import SingleThreadedExecutor
+
+from fisheye_bridge.hearing import DEAF_S, TOPIC, Hearing
+from fisheye_bridge.qos import HEARTBEAT
+
+WAIT_S = 20.0
+
+
+class Pair:
+    """A node that listens, and another one that promises reports, or does not."""
+
+    def __init__(self, qos):
+        self.now_s = 0.0
+        self.listener, self.other = rclpy.create_node('listener'), rclpy.create_node('other')
+        self.publisher = self.other.create_publisher(DiagnosticArray, TOPIC, qos)
+        self.hearing = Hearing(self.listener, lambda: self.now_s)
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self.listener)
+
+    def spin_until(self, condition):
+        deadline_s = monotonic() + WAIT_S
+        while not (value := condition()):
+            assert monotonic() < deadline_s
+            self._executor.spin_once(timeout_sec=0.05)
+        return value
+
+    def say(self, name):
+        status = DiagnosticStatus(name=name, hardware_id=f'/{name}')
+        self.publisher.publish(DiagnosticArray(status=[status]))
+
+    def is_seen(self):
+        return self.listener.count_publishers(TOPIC)
+
+    def silence_after(self, later_s):
+        self.hearing.silence()
+        self.now_s += later_s
+        return self.hearing.silence()
+
+
+@pytest.fixture
+def pair(request):
+    rclpy.init()
+    pair = Pair(getattr(request, 'param', HEARTBEAT))
+    pair.spin_until(pair.is_seen)
+    yield pair
+    for node in (pair.listener, pair.other):
+        node.destroy_node()
+    rclpy.shutdown()
+
+
+def test_who_is_seen_and_not_heard_is_named(pair):
+    assert not pair.silence_after(DEAF_S / 2)
+    assert pair.silence_after(DEAF_S) == 'other can be seen, but nothing comes from there'
+
+
+def test_who_was_heard_once_may_be_silent(pair):
+    def is_heard():
+        pair.say('other')
+        return not pair.listener.count_subscribers(TOPIC)  # it listens no more
+
+    pair.spin_until(is_heard)
+    assert not pair.silence_after(10 * DEAF_S)
+
+
+@pytest.mark.parametrize('pair', [10], indirect=True)
+def test_who_promises_nothing_may_be_silent(pair):
+    assert not pair.silence_after(10 * DEAF_S)
