@@ -6,7 +6,7 @@ write first: two remaps of what shows, and a feather by `cv2.blendLinear`. Ratio
 percentiles, which a busy machine disturbs least.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -15,10 +15,12 @@ from pairs import Pair, synthetic_pair
 from targets import Target
 from timing import Spread, interleaved, spread
 
+from fisheye_geometry.attitude import LEVEL, Attitude
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.surface import Surface
 from panorama_stitch.compose.compositor import BLENDS, Compositor
 from panorama_stitch.compose.layout import Layout
+from panorama_stitch.compose.view import View
 from panorama_stitch.settings import PanoramaSettings
 
 SIZES = (640, 480), (1280, 960), (1920, 1080)
@@ -110,13 +112,12 @@ def prepare(size: tuple[int, int], interpolation: str) -> tuple[dict[str, Callab
     ways['feather, gain'], _ = composing(unlike, 'feather', interpolation, gain=True)
     compositor = compositor_of(equal, 'feather', interpolation, gain=False)
     layout, surface = compositor.layout, compositor.layout.surface
-    views = [view.surface for view in compositor.views]
     panorama = np.empty((surface.height, surface.width, 3), np.uint8)
     other = panorama.copy()
     ways['memcpy'] = lambda: np.copyto(panorama, other)
-    ways['floor'] = floor(equal, views, interpolation)
-    ways['one remap'] = one_remap(equal, views, layout, interpolation, panorama)
-    ways['naive'] = naive(equal, views, layout, interpolation, panorama)
+    ways['floor'] = floor(equal, compositor.views, interpolation)
+    ways['one remap'] = one_remap(equal, compositor.views, layout, interpolation, panorama)
+    ways['naive'] = naive(equal, compositor.views, layout, interpolation, panorama)
     return {way: ways[way] for way in WAYS}, surface.width * surface.height / 1e6
 
 
@@ -140,13 +141,10 @@ def own(pair: Pair) -> list[np.ndarray]:
     return [image.copy() for image in pair.images]
 
 
-def floor(pair: Pair, surfaces: list[Surface], interpolation: str) -> Callable[[], None]:
+def floor(pair: Pair, views: Sequence[View], interpolation: str) -> Callable[[], None]:
     """Correct both whole frames."""
-    tables = [
-        fixed(positions(lens, surface), interpolation)
-        for lens, surface in zip(pair.lenses, surfaces, strict=True)
-    ]
-    outs = [np.empty((surface.height, surface.width, 3), np.uint8) for surface in surfaces]
+    tables = [fixed(positions(view.source, view.surface), interpolation) for view in views]
+    outs = [np.empty((v.surface.height, v.surface.width, 3), np.uint8) for v in views]
     images = own(pair)
 
     def correct():
@@ -156,14 +154,12 @@ def floor(pair: Pair, surfaces: list[Surface], interpolation: str) -> Callable[[
     return correct
 
 
-def one_remap(pair: Pair, surfaces, layout: Layout, interpolation: str, out: np.ndarray):
+def one_remap(pair: Pair, views, layout: Layout, interpolation: str, out: np.ndarray):
     """Draw the whole panorama at once."""
     middle = sum(layout.seams[0]) // 2
     parts = [
-        positions(lens, part(surface, layout, index, *columns))
-        for index, (lens, surface, columns) in enumerate(
-            zip(pair.lenses, surfaces, ((0, middle), (middle, out.shape[1])), strict=True)
-        )
+        shown_by(view, layout, *columns)
+        for view, columns in zip(views, ((0, middle), (middle, out.shape[1])), strict=True)
     ]
     parts[1][..., 1] += len(pair.images[0])
     table = fixed(np.concatenate(parts, axis=1), interpolation)
@@ -171,12 +167,12 @@ def one_remap(pair: Pair, surfaces, layout: Layout, interpolation: str, out: np.
     return lambda: cv2.remap(stacked, *table, FLAGS[interpolation], dst=out)
 
 
-def naive(pair: Pair, surfaces, layout: Layout, interpolation: str, out: np.ndarray):
+def naive(pair: Pair, views, layout: Layout, interpolation: str, out: np.ndarray):
     """Draw what shows of each view, and feather where both do."""
     begin, end = layout.seams[0]
     tables = [
-        fixed(positions(lens, part(surface, layout, i, *layout.drawn(i))), interpolation)
-        for i, (lens, surface) in enumerate(zip(pair.lenses, surfaces, strict=True))
+        fixed(shown_by(view, layout, *layout.drawn(i)), interpolation)
+        for i, view in enumerate(views)
     ]
     right = np.empty((len(out), out.shape[1] - begin, 3), np.uint8)
     images = own(pair)
@@ -192,16 +188,16 @@ def naive(pair: Pair, surfaces, layout: Layout, interpolation: str, out: np.ndar
     return compose
 
 
-def part(surface: Surface, layout: Layout, index: int, begin: int, end: int) -> Surface:
-    """Give columns of the panorama as a window of a view's surface."""
-    origin = layout.origins[index]
-    return surface.window(begin - origin.x_px, -origin.y_px, end - begin, layout.surface.height)
+def shown_by(view: View, layout: Layout, begin: int, end: int) -> np.ndarray:
+    """Where in a view's picture the pixels of some columns of the panorama come from."""
+    window = layout.surface.window(begin, 0, end - begin, layout.surface.height)
+    return positions(view.source, window, view.attitude)
 
 
-def positions(lens: Lens, surface: Surface) -> np.ndarray:
+def positions(lens: Lens, surface: Surface, attitude: Attitude = LEVEL) -> np.ndarray:
     """(height, width, 2) float32: where in the picture each pixel of a surface comes from."""
     y, x = np.ogrid[: surface.height, : surface.width]
-    pixels, seen = lens.project(surface.rays(x, y))
+    pixels, seen = lens.project(surface.rays(x, y) @ attitude.matrix)
     return np.where(seen[..., None], pixels, -100).astype(np.float32)
 
 

@@ -61,7 +61,7 @@ def _box(picture, particles, match, first_column):
 
 def _compose(left, right, surface, overlap):
     """Lay the right view over the left one, and mark where it begins."""
-    right = RemapTable(surface, surface, turn=overlap.turn)(right)
+    right = RemapTable(surface, surface, attitude=overlap.turn)(right)
     x, y = round(overlap.offset_x_px), round(overlap.offset_y_px)
     top = max(0, -y)
     height = max(left.shape[0] + top, right.shape[0] + top + y)

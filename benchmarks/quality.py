@@ -136,12 +136,12 @@ def at_the_seam(out, pair: Pair, compositor: Compositor) -> tuple[np.ndarray, fl
     seam, reach = layout.seams[0], max(2, round(PATCH_DEG * px_per_deg))
     begin, end = seam.begin - reach, seam.end + reach
     alone = []
-    for index, (view, origin) in enumerate(zip(compositor.views, layout.origins, strict=True)):
-        cut = view.cut(begin - origin.x_px, -origin.y_px, end - begin, layout.surface.height)
-        drawn = np.empty((layout.surface.height, end - begin, 3), np.uint8)
-        cut(pair.images[index], drawn)
+    window = layout.surface.window(begin, 0, end - begin, layout.surface.height)
+    for index, view in enumerate(compositor.views):
+        table = view.drawn_on(window)
+        drawn = table(pair.images[index])
         factors = compositor.gain.factors[index] if compositor.gain else 1.0
-        seen = view.shown(cut, drawn.shape[:2])[..., None]
+        seen = view.shows_scene(table)[..., None]
         alone.append(np.where(seen, np.minimum(drawn * factors, 255), np.nan))
     difference = np.delete(alone[1] - alone[0], np.s_[reach:-reach], axis=1)
     rows = np.array_split(difference, len(difference) // PATCH_ROWS)

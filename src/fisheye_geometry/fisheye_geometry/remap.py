@@ -1,12 +1,14 @@
 """Remap tables: where each pixel of a corrected picture comes from, computed once."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from copy import copy
 from functools import lru_cache
 from typing import NamedTuple
 
 import cv2
 import numpy as np
 
+from fisheye_geometry.attitude import LEVEL, Attitude
 from fisheye_geometry.errors import GeometryError, ImageFormatError
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.surface import Surface
@@ -17,39 +19,12 @@ _INTERPOLATIONS = {
     'cubic': cv2.INTER_CUBIC,
 }
 INTERPOLATIONS = tuple(_INTERPOLATIONS)
+Turn = Attitude
 
 _OUTSIDE_PX = -100
 """Far enough from the picture that no interpolation reaches it."""
 _BAND_PX = 20_000
 """Rows are drawn in bands of about so many pixels of the picture, which stay in the cache."""
-
-
-@dataclass(frozen=True)
-class Turn:
-    """Attitude of a camera in the frame of its surface, rad.
-
-    Yaw turns the camera to the right, pitch up, roll clockwise as the camera sees it, in the
-    order yaw, pitch, roll.
-    """
-
-    yaw_rad: float = 0.0
-    pitch_rad: float = 0.0
-    roll_rad: float = 0.0
-
-    @property
-    def matrix(self) -> np.ndarray:
-        """Rotation (3, 3) that takes rays of the camera to rays of the surface."""
-        (cy, sy), (cp, sp), (cr, sr) = (
-            (np.cos(angle), np.sin(angle))
-            for angle in (self.yaw_rad, self.pitch_rad, self.roll_rad)
-        )
-        yaw = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
-        pitch = np.array([[1, 0, 0], [0, cp, -sp], [0, sp, cp]])
-        roll = np.array([[cr, -sr, 0], [sr, cr, 0], [0, 0, 1]])
-        return yaw @ pitch @ roll
-
-
-LEVEL = Turn()
 
 
 class _Band(NamedTuple):
@@ -59,15 +34,11 @@ class _Band(NamedTuple):
     ----------
     rows
         Of the surface.
-    pixels, fractions
-        Fixed-point maps as `cv2.convertMaps` gives them.
     fresh
         Rows and columns of the picture that are needed here, rows of the band above left out.
     """
 
     rows: slice
-    pixels: np.ndarray
-    fractions: np.ndarray | None
     fresh: tuple[slice, slice]
 
 
@@ -89,7 +60,7 @@ class RemapTable:
         source: Lens | Surface,
         surface: Surface,
         interpolation: str = 'linear',
-        turn: Turn = LEVEL,
+        attitude: Attitude = LEVEL,
     ):
         """Compute the maps.
 
@@ -101,8 +72,8 @@ class RemapTable:
             What the corrected picture is to show.
         interpolation
             One of `INTERPOLATIONS`.
-        turn
-            Attitude of the source in the frame of the surface.
+        attitude
+            Of the source in the frame of the surface.
 
         Raises
         ------
@@ -114,22 +85,52 @@ class RemapTable:
                 f"interpolation '{interpolation}' is not known; "
                 f'expected one of {", ".join(INTERPOLATIONS)}'
             )
+        shape = surface.height, surface.width
         self.surface = surface
         self._input_shape = (source.height, source.width)
         self._flag = _INTERPOLATIONS[interpolation]
-        self.valid = np.empty((surface.height, surface.width), bool)
+        self.valid = np.empty(shape, bool)
+        self._pixels = np.empty((*shape, 2), np.int16)
+        self._fractions = None if interpolation == 'nearest' else np.empty(shape, np.uint16)
         self._bands = []
         needed = range(0), range(0)
-        step = max(8, round(_BAND_PX / source.width))
-        for top in range(0, surface.height, step):
-            rows = slice(top, min(top + step, surface.height))
-            where, self.valid[rows] = _source_pixels(source, surface, turn, rows)
-            nearest = interpolation == 'nearest'
-            pixels, fractions = cv2.convertMaps(where, None, cv2.CV_16SC2, nninterpolation=nearest)
-            above, needed = needed, _needed(where[self.valid[rows]])
-            band = _Band(rows, pixels, None if nearest else fractions, _fresh(needed, above))
-            self._bands.append(band)
+        for rows in self._band_rows():
+            where, self.valid[rows] = _source_pixels(source, surface, attitude, rows)
+            pixels, fractions = cv2.convertMaps(
+                where, None, cv2.CV_16SC2, nninterpolation=self._fractions is None
+            )
+            self._pixels[rows] = pixels
+            if self._fractions is not None:
+                self._fractions[rows] = fractions
+            needed = self._add_band(rows, needed)
         self.valid.setflags(write=False)
+
+    def part(self, rows: slice, columns: slice) -> 'RemapTable':
+        """Return the table of a part of the surface; it shares no memory with this one."""
+        part = copy(self)
+        top, left = rows.start, columns.start
+        part.surface = self.surface.window(left, top, columns.stop - left, rows.stop - top)
+        part.valid = self.valid[rows, columns].copy()
+        part._pixels = self._pixels[rows, columns].copy()
+        if self._fractions is not None:
+            part._fractions = self._fractions[rows, columns].copy()
+        part._bands = []
+        needed = range(0), range(0)
+        for band in part._band_rows():
+            needed = part._add_band(band, needed)
+        part.valid.setflags(write=False)
+        return part
+
+    def _band_rows(self) -> Iterator[slice]:
+        step = max(8, round(_BAND_PX / self._input_shape[1]))
+        for top in range(0, self.surface.height, step):
+            yield slice(top, min(top + step, self.surface.height))
+
+    def _add_band(self, rows: slice, above: tuple[range, range]) -> tuple[range, range]:
+        """Note a band whose maps are there; return the rows and columns that it needs."""
+        needed = _needed(self._pixels[rows][self.valid[rows]])
+        self._bands.append(_Band(rows, _fresh(needed, above)))
+        return needed
 
     def __call__(self, image: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
         """Correct a picture.
@@ -162,13 +163,13 @@ class RemapTable:
             out = np.empty(expected, image.dtype)
         if out.shape != expected or out.dtype != image.dtype:
             raise ImageFormatError(f'out is {out.dtype}{out.shape}; expected {expected}')
-        for rows, pixels, fractions, fresh in self._bands:
+        for rows, fresh in self._bands:
             # Read in order, the picture comes from memory ahead of need; along curves it does not.
             cv2.sumElems(image[fresh])
             cv2.remap(
                 image,
-                pixels,
-                fractions,
+                self._pixels[rows],
+                None if self._fractions is None else self._fractions[rows],
                 self._flag,
                 dst=out[rows],
                 borderMode=cv2.BORDER_CONSTANT,
@@ -181,13 +182,13 @@ def remap_table(
     source: Lens | Surface,
     surface: Surface,
     interpolation: str = 'linear',
-    turn: Turn = LEVEL,
+    attitude: Attitude = LEVEL,
 ) -> RemapTable:
     """Build a `RemapTable`, or give the one that was built from the same arguments.
 
     Parameters
     ----------
-    source, surface, interpolation, turn
+    source, surface, interpolation, attitude
         As `RemapTable` takes them.
 
     Returns
@@ -200,13 +201,13 @@ def remap_table(
     GeometryError
         For an interpolation that is not known.
     """
-    return RemapTable(source, surface, interpolation, turn)
+    return RemapTable(source, surface, interpolation, attitude)
 
 
-def _source_pixels(source: Lens | Surface, surface: Surface, turn: Turn, rows: slice):
+def _source_pixels(source: Lens | Surface, surface: Surface, attitude: Attitude, rows: slice):
     """Pixels (rows, width, 2) float32 of the source's picture, and where there are any."""
     y, x = np.ogrid[rows, : surface.width]
-    pixels, seen = source.project(surface.rays(x, y) @ turn.matrix)
+    pixels, seen = source.project(surface.rays(x, y) @ attitude.matrix)
     last = np.array([source.width - 1, source.height - 1])
     # A pixel is half a pixel wide to each side; beyond its centre the outermost is repeated.
     seen &= np.all((pixels >= -0.5) & (pixels <= last + 0.5), axis=-1)
@@ -218,7 +219,7 @@ def _needed(pixels: np.ndarray) -> tuple[range, range]:
     """Rows and columns of the picture in which pixels (n, 2) lie."""
     if not len(pixels):
         return range(0), range(0)
-    (left, top), (right, bottom) = pixels.min(axis=0).astype(int), pixels.max(axis=0).astype(int)
+    (left, top), (right, bottom) = pixels.min(axis=0).tolist(), pixels.max(axis=0).tolist()
     return range(top, bottom + 2), range(left, right + 2)
 
 

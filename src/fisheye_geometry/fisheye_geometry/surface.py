@@ -5,61 +5,15 @@ a shift of columns by `focal_px` times the angle; on a `rectilinear` one it is n
 """
 
 from dataclasses import dataclass, replace
-from math import pi
+from math import inf, pi
 
 import numpy as np
 
 from fisheye_geometry.errors import GeometryError
 from fisheye_geometry.lens import MAX_PICTURE_SIDE_PX, Lens
+from fisheye_geometry.surface_kind import KINDS
 
-
-def _cylinder_rays(a, b):
-    return np.sin(a), b, np.cos(a)
-
-
-def _cylinder_point(x, y, z):
-    side = np.hypot(x, z)
-    return np.arctan2(x, z), np.divide(y, side, out=np.full_like(y, np.inf), where=side > 0)
-
-
-def _sphere_rays(a, b):
-    return np.cos(b) * np.sin(a), np.sin(b), np.cos(b) * np.cos(a)
-
-
-def _sphere_point(x, y, z):
-    return np.arctan2(x, z), np.arctan2(y, np.hypot(x, z))
-
-
-def _plane_rays(a, b):
-    return a, b, np.ones_like(a)
-
-
-def _plane_point(x, y, z):
-    front = z > 0
-    return tuple(np.divide(c, z, out=np.full_like(c, np.inf), where=front) for c in (x, y))
-
-
-@dataclass(frozen=True)
-class _Kind:
-    """How one kind of surface maps; `a` and `b` are columns and rows in focal lengths."""
-
-    rays: callable
-    point: callable
-    column: callable
-    """Angle to the side, rad, to `a`."""
-    row: callable
-    """Angle above or below the horizon, rad, to `b`."""
-    steepest_rad: float
-    """No row (of a plane: no column either) is placed beyond this angle by itself."""
-
-
-_KINDS = {
-    'cylindrical': _Kind(_cylinder_rays, _cylinder_point, float, np.tan, np.radians(70)),
-    'equirectangular': _Kind(_sphere_rays, _sphere_point, float, float, pi / 2),
-    'rectilinear': _Kind(_plane_rays, _plane_point, np.tan, np.tan, np.radians(60)),
-}
-
-SURFACES = tuple(_KINDS)
+SURFACES = tuple(KINDS)
 _MAX_PIXELS = 50_000_000
 """Above it the maps of a single camera would take more than 300 MB."""
 _LARGEST_PX = 1e6
@@ -96,7 +50,7 @@ class Surface:
     center_y_px: float
 
     def __post_init__(self):
-        if self.kind not in _KINDS:
+        if self.kind not in KINDS:
             raise GeometryError(
                 f"surface '{self.kind}' is not known; expected one of {', '.join(SURFACES)}"
             )
@@ -122,9 +76,9 @@ class Surface:
                 )
 
     @property
-    def turns_are_shifts(self) -> bool:
+    def yaw_is_column_shift(self) -> bool:
         """Whether a turn about the vertical is a shift of columns."""
-        return self.kind != 'rectilinear'
+        return KINDS[self.kind].yaw_is_column_shift
 
     def rays(self, x_px: np.ndarray, y_px: np.ndarray) -> np.ndarray:
         """Directions (..., 3) float64, of any length, at pixels (broadcast against each other)."""
@@ -132,15 +86,30 @@ class Surface:
             (np.asarray(x_px, float) - self.center_x_px) / self.focal_px,
             (np.asarray(y_px, float) - self.center_y_px) / self.focal_px,
         )
-        return np.stack(_KINDS[self.kind].rays(a, b), axis=-1)
+        return np.stack(KINDS[self.kind].rays(a, b), axis=-1)
 
     def project(self, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Pixels (..., 2) at which directions (..., 3) meet the surface, and which do (...)."""
-        a, b = _KINDS[self.kind].point(*np.moveaxis(np.asarray(rays, float), -1, 0))
+        a, b = KINDS[self.kind].point(*np.moveaxis(np.asarray(rays, float), -1, 0))
         seen = np.isfinite(a) & np.isfinite(b)
         x = np.where(seen, a, 0.0) * self.focal_px + self.center_x_px
         y = np.where(seen, b, 0.0) * self.focal_px + self.center_y_px
         return np.stack([x, y], axis=-1), seen
+
+    def unproject(self, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the rays (..., 3) at pixels (..., 2), and which there are: all of them."""
+        pixels = np.asarray(pixels, float)
+        return self.rays(pixels[..., 0], pixels[..., 1]), np.ones(pixels.shape[:-1], bool)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height, px."""
+        return self.width, self.height
+
+    @property
+    def circumference_px(self) -> float:
+        """Columns that lead all around, px; infinite on a surface that does not."""
+        return 2 * pi * self.focal_px if self.yaw_is_column_shift else inf
 
     def window(self, x_px: float, y_px: float, width: int, height: int) -> 'Surface':
         """Give the part whose upper left pixel is (x_px, y_px); it may reach past the edges."""
@@ -197,24 +166,23 @@ def surface_for(
     GeometryError
         Where the surface cannot hold what was asked.
     """
-    if kind not in _KINDS:
+    if kind not in KINDS:
         raise GeometryError(
             f"surface '{kind}' is not known; expected one of {', '.join(SURFACES)}"
         )
     if scale not in SCALES:
         raise GeometryError(f"scale '{scale}' is not known; expected one of {', '.join(SCALES)}")
-    how = _KINDS[kind]
-    if kind == 'rectilinear' and max(hfov_rad, vfov_rad) >= np.radians(170):
+    how = KINDS[kind]
+    if max(hfov_rad, vfov_rad) >= how.fov_limit_rad:
         raise GeometryError(
-            'a rectilinear surface holds less than 170 degrees; '
+            f'a {kind} surface holds less than {np.degrees(how.fov_limit_rad):g} degrees; '
             f'{np.degrees(max(hfov_rad, vfov_rad)):g} were asked'
         )
-    side_limit = how.steepest_rad if kind == 'rectilinear' else pi
     left, right = _extent(
         hfov_rad,
         lens.angle_at(-0.5, lens.center_y_px),
         lens.angle_at(lens.width - 0.5, lens.center_y_px),
-        side_limit,
+        how.widest_rad,
     )
     up, down = _extent(
         vfov_rad,
@@ -222,8 +190,8 @@ def surface_for(
         lens.angle_at(lens.center_x_px, lens.height - 0.5),
         how.steepest_rad,
     )
-    columns = float(how.column(left) + how.column(right))
-    rows = float(how.row(up) + how.row(down))
+    columns = how.column(left) + how.column(right)
+    rows = how.row(up) + how.row(down)
     if scale == 'fit':
         width, height = width or lens.width, height or lens.height
     focal_px = width / columns if width else lens.focal_x_px
@@ -234,8 +202,8 @@ def surface_for(
         width=width,
         height=height,
         focal_px=focal_px,
-        center_x_px=float(how.column(left)) * focal_px - 0.5,
-        center_y_px=float(how.row(up)) / rows * height - 0.5,
+        center_x_px=how.column(left) * focal_px - 0.5,
+        center_y_px=how.row(up) / rows * height - 0.5,
     )
 
 

@@ -35,14 +35,14 @@ def test_a_turn_of_the_camera_is_a_shift_of_columns(kind):
     )
     shift = surface.project(turned)[0] - surface.project(rays)[0]
     assert shift == pytest.approx(np.broadcast_to([turn * 200, 0], shift.shape), abs=1e-9)
-    assert surface.turns_are_shifts
+    assert surface.yaw_is_column_shift
 
 
 def test_a_ray_behind_a_plane_is_not_seen():
     surface = Surface('rectilinear', 100, 100, 50.0, 50.0, 50.0)
     _, seen = surface.project(np.array([[0.1, 0, 1], [0.1, 0, -1], [1, 0, 0]]))
     assert seen.tolist() == [True, False, False]
-    assert not surface.turns_are_shifts
+    assert not surface.yaw_is_column_shift
 
 
 def test_preserve_area_keeps_the_lens_scale_and_its_field_of_view():

@@ -93,7 +93,7 @@ class PanoramaBase(Node):
             self._buffer = ImageBuffer(*size)
         compositor.compose(images, self._buffer.array, are_live=not ages_s)
         for camera, age_s in ages_s.items():
-            columns = compositor.layout.drawn(self.settings.cameras.index(camera))
+            columns = compositor.layout.shown_columns(self.settings.cameras.index(camera))
             write_age(self._buffer.array, columns, camera, age_s)
         self._buffer.message.header = _header(stamp_ns)
         self._image.publish(self._buffer.message, self._buffer.array, self.settings.jpeg_quality)

@@ -119,7 +119,7 @@ class _Measurement:
             x_px=self._expected(),
             max_rise_deg=self._settings.max_rise_deg,
             min_overlap_deg=self._settings.min_overlap_deg,
-            tilt=self._settings.correct_tilt and self._surfaces[1].turns_are_shifts,
+            tilt=self._settings.correct_tilt and self._surfaces[1].yaw_is_column_shift,
             min_confidence=self._settings.min_confidence,
         )
         by_particles = method == 'particles'
@@ -163,7 +163,7 @@ class _Measurement:
     def _expected(self) -> tuple[float, float]:
         """Offsets of the facing halves, px, that the rig's geometry allows."""
         s = self._settings
-        if isnan(s.expected_yaw_deg) or not self._surfaces[0].turns_are_shifts:
+        if isnan(s.expected_yaw_deg) or not self._surfaces[0].yaw_is_column_shift:
             return Search.x_px
         left, right = self._surfaces
         first = left.center_x_px - right.center_x_px - self._half_start

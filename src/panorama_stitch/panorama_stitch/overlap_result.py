@@ -71,7 +71,7 @@ def apart_rad(offset_x_px: float, left: Surface, right: Surface) -> float:
     float
         rad; NaN on a rectilinear surface, where an offset is no angle.
     """
-    if not left.turns_are_shifts:
+    if not left.yaw_is_column_shift:
         return nan
     return (offset_x_px + right.center_x_px - left.center_x_px) / left.focal_px
 

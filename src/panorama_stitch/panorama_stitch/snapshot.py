@@ -139,7 +139,7 @@ def _limits(surface: Surface) -> tuple[float, ...]:
     """Bearings of the outer edges, angles below the horizon of the upper and lower one, rad."""
     x = surface.center_x_px
     bearings = [(edge - x) / surface.focal_px for edge in (-0.5, surface.width - 0.5)]
-    if not surface.turns_are_shifts:
+    if not surface.yaw_is_column_shift:
         bearings = [atan(bearing) for bearing in bearings]
     rays = [surface.rays(x, edge) for edge in (-0.5, surface.height - 0.5)]
     return *bearings, *(atan2(down, hypot(right, ahead)) for right, down, ahead in rays)

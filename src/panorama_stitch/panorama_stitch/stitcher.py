@@ -10,15 +10,13 @@ import numpy as np
 
 from fisheye_geometry.errors import ImageFormatError, OverlapError
 from fisheye_geometry.lens import Lens
-from fisheye_geometry.remap import LEVEL
 from fisheye_geometry.surface import Surface
-from panorama_stitch.compose.compositor import BLENDS, Compositor
-from panorama_stitch.compose.gain import GainCompensation
-from panorama_stitch.compose.layout import lay_out
-from panorama_stitch.compose.seam import settle_seams
+from panorama_stitch.compose.build import Style, build_compositor
+from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.compose.view import View
 from panorama_stitch.overlap import measure_overlap
 from panorama_stitch.overlap_result import Overlap, side_by_side
+from panorama_stitch.posing import views_at_overlaps
 from panorama_stitch.settings import PanoramaOutputSettings
 
 Group = Sequence[np.ndarray]
@@ -135,7 +133,7 @@ class Stitcher:
             overlap = measure_overlap(
                 pairs, views[i].surface, views[i + 1].surface, settings, method
             )
-            views[i + 1] = replace(views[i + 1], turn=overlap.turn)
+            views[i + 1] = replace(views[i + 1], attitude=overlap.turn)
             overlaps.append(overlap)
         return overlaps
 
@@ -170,21 +168,14 @@ class Stitcher:
             If the surfaces cannot be joined.
         """
         overlaps = self.in_use(settings)
-        turns = [LEVEL, *(overlap.turn for overlap in overlaps)]
-        views = [
-            replace(view, turn=turn) for view, turn in zip(self._views(group), turns, strict=True)
-        ]
-        fade_px = np.radians(settings.feather_deg) * views[0].surface.focal_px
-        fade_px *= BLENDS[settings.blend]
-        layout = lay_out(
-            views,
-            [(overlap.offset_x_px, overlap.offset_y_px) for overlap in overlaps],
-            fade_px=fade_px,
-            crop=settings.crop if all(overlap.found for overlap in overlaps) else 'none',
+        is_found = all(overlap.found for overlap in overlaps)
+        style = Style(
+            blend=settings.blend,
+            fade_rad=np.radians(settings.feather_deg),
+            crop=settings.crop if is_found else 'none',
+            is_gain_compensated=settings.gain_compensation,
         )
-        layout = settle_seams(layout, views, group)
-        gain = GainCompensation(layout, views, group) if settings.gain_compensation else None
-        return Compositor(layout, views, settings.blend, gain)
+        return build_compositor(views_at_overlaps(self._views(group), overlaps), group, style)
 
     def _views(self, group: Group) -> list[View]:
         views = []

@@ -13,7 +13,10 @@ from fisheye_geometry.image_circle import ImageCircle
 from fisheye_geometry.lens import FisheyeLens
 from fisheye_geometry.remap import LEVEL, RemapTable, Turn
 from fisheye_geometry.surface import Surface, surface_for
+from panorama_stitch.compose.placing import place
 from panorama_stitch.compose.view import View
+from panorama_stitch.overlap_result import Overlap
+from panorama_stitch.posing import views_at_overlaps
 
 DATA = Path(os.environ.get('FISHEYE_DATA', ''))
 YAW_DEG = 140.0
@@ -60,7 +63,7 @@ def look(world: np.ndarray, surface: Surface, yaw_deg: float, lens: FisheyeLens)
     sphere = Surface(
         'equirectangular', width, height, width / 2 / pi, (width - 1) / 2, (height - 1) / 2
     )
-    picture = RemapTable(sphere, surface, turn=Turn(-radians(yaw_deg)))(world)
+    picture = RemapTable(sphere, surface, attitude=Turn(-radians(yaw_deg)))(world)
     return np.where(RemapTable(lens, surface).valid, np.maximum(picture, 1), 0).astype(np.uint8)
 
 
@@ -78,7 +81,7 @@ def pair(
 def tilted(picture: np.ndarray, surface: Surface, turn: Turn) -> np.ndarray:
     """Give the picture that a turn about one axis makes level again."""
     back = Turn(-turn.yaw_rad, -turn.pitch_rad, -turn.roll_rad)
-    return RemapTable(surface, surface, turn=back)(picture)
+    return RemapTable(surface, surface, attitude=back)(picture)
 
 
 def exposed(picture: np.ndarray, gain: float, noise: float, seed: int = 7) -> np.ndarray:
@@ -111,8 +114,14 @@ def real_views(name: str, kind: str = 'cylindrical', turn: Turn = LEVEL):
         if surfaces:
             surface = surface.with_focal(surfaces[0].focal_px)
         surfaces.append(surface)
-        pictures.append(View(camera, surface, turn=attitude).corrected(picture))
+        pictures.append(View(camera, surface, attitude=attitude).corrected(picture))
     return tuple(pictures), tuple(surfaces)
+
+
+def placed_at(views, *offsets, found: bool = True):
+    """Place views whose corrected pictures lie at offsets (x, y), px, in the one before."""
+    overlaps = [Overlap('true', found, float(x), float(y)) for x, y in offsets]
+    return place(views_at_overlaps(views, overlaps))
 
 
 def _in_range(values):

@@ -6,8 +6,10 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from scenes import placed_at
 
 from fisheye_capture.scene import Scene
+from fisheye_geometry.attitude import LEVEL
 from fisheye_geometry.errors import ImageFormatError
 from fisheye_geometry.lens import make_lens
 from fisheye_geometry.remap import Turn
@@ -15,7 +17,10 @@ from fisheye_geometry.surface import surface_for
 from panorama_stitch.compose.compositor import BLENDS, Compositor
 from panorama_stitch.compose.gain import GainCompensation
 from panorama_stitch.compose.layout import covered, lay_out
+from panorama_stitch.compose.placing import place
 from panorama_stitch.compose.view import View
+from panorama_stitch.overlap_result import Overlap
+from panorama_stitch.posing import views_at_overlaps
 
 YAW = np.radians(140)
 STAMP_NS = 700_000_000
@@ -48,10 +53,16 @@ def views_of(pictures, corrected):
 
 
 def composed(views, images, offset_px=OFFSET, fade_px=10.0, crop='valid'):
-    layout = lay_out(views, [(offset_px, 0.0)], fade_px=fade_px, crop=crop)
-    out = np.full((layout.surface.height, layout.surface.width, 3), 77, np.uint8)
-    Compositor(layout, views).compose(images, out)
-    return layout, out
+    placed = placed_at(views, (offset_px, 0))
+    layout = lay_out(placed, fade_px=fade_px, crop=crop)
+    return drawn(layout, placed, images)
+
+
+def drawn(layout, placed, images):
+    shape = (layout.surface.height, layout.surface.width, *images[0].shape[2:])
+    out = np.full(shape, 77, np.uint8)
+    Compositor(layout, placed).compose(images, out)
+    return layout, placed, out
 
 
 def psnr(a, b, where):
@@ -63,9 +74,9 @@ def psnr(a, b, where):
 def test_it_shows_the_scene(pictures, corrected, fade_px):
     views, images = views_of(pictures, corrected)
     offset = round(OFFSET) if corrected else OFFSET
-    layout, out = composed(views, images, offset, fade_px, crop='none')
+    layout, placed, out = composed(views, images, offset, fade_px, crop='none')
     truth = Scene().view(layout.surface).frame(STAMP_NS)
-    valid = covered(layout, views)
+    valid = covered(layout, placed)
     assert valid.mean() > 0.7
     assert psnr(out, truth, valid) > FAITHFUL_DB
     outside = cv2.erode((~valid).astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
@@ -75,8 +86,8 @@ def test_it_shows_the_scene(pictures, corrected, fade_px):
 @pytest.mark.parametrize('corrected', [False, True])
 def test_a_crop_leaves_no_black_and_keeps_the_field_of_view(pictures, corrected):
     views, images = views_of(pictures, corrected)
-    layout, out = composed(views, images, round(OFFSET))
-    assert covered(layout, views).all()
+    layout, placed, out = composed(views, images, round(OFFSET))
+    assert covered(layout, placed).all()
     assert out.any(axis=2).all()
     shown_deg = np.degrees(layout.surface.width / layout.surface.focal_px)
     assert shown_deg > 310 - 2 * 3.0
@@ -89,8 +100,10 @@ def test_a_crop_leaves_no_black_where_the_right_view_lies_over_the_left(
     pictures, corrected, offset_px
 ):
     views, images = views_of(pictures, corrected)
-    layout, out = composed(views, images, round(offset_px) if corrected else offset_px, 0.0)
-    assert covered(layout, views).all()
+    layout, placed, out = composed(
+        views, images, round(offset_px) if corrected else offset_px, 0.0
+    )
+    assert covered(layout, placed).all()
     assert out.any(axis=2).all()
 
 
@@ -98,8 +111,9 @@ def test_a_crop_leaves_no_black_where_the_right_view_lies_over_the_left(
 def test_every_blend_shows_the_scene_without_allocating_pictures(pictures, blend):
     views = [View(LENS, SURFACE)] * 2
     darker = [pictures[0], (pictures[1] * 0.8).astype(np.uint8)]
-    layout = lay_out(views, [(OFFSET, 0.0)], fade_px=10.0 * BLENDS[blend], crop='valid')
-    compositor = Compositor(layout, views, blend, GainCompensation(layout, views, darker))
+    placed = placed_at(views, (OFFSET, 0))
+    layout = lay_out(placed, fade_px=10.0 * BLENDS[blend], crop='valid')
+    compositor = Compositor(layout, placed, blend, GainCompensation(layout, placed, darker))
     out = np.empty((layout.surface.height, layout.surface.width, 3), np.uint8)
     compositor.compose(darker, out)
     truth = Scene().view(layout.surface, gain=0.8).frame(STAMP_NS)
@@ -113,8 +127,9 @@ def test_every_blend_shows_the_scene_without_allocating_pictures(pictures, blend
 
 def test_pictures_that_are_not_live_teach_nothing_about_brightness(pictures):
     views = [View(LENS, SURFACE)] * 2
-    layout = lay_out(views, [(OFFSET, 0.0)], fade_px=10.0, crop='valid')
-    compositor = Compositor(layout, views, gain=GainCompensation(layout, views, pictures))
+    placed = placed_at(views, (OFFSET, 0))
+    layout = lay_out(placed, fade_px=10.0, crop='valid')
+    compositor = Compositor(layout, placed, gain=GainCompensation(layout, placed, pictures))
     out = np.empty((layout.surface.height, layout.surface.width, 3), np.uint8)
     before = compositor.gain.factors
     for _ in range(50):
@@ -124,9 +139,10 @@ def test_pictures_that_are_not_live_teach_nothing_about_brightness(pictures):
 
 def test_a_picture_that_is_not_live_does_not_change_the_gain(pictures):
     views = [View(LENS, SURFACE)] * 2
-    layout = lay_out(views, [(OFFSET, 0.0)], fade_px=10.0, crop='valid')
-    gain = GainCompensation(layout, views, pictures)
-    compositor = Compositor(layout, views, gain=gain)
+    placed = placed_at(views, (OFFSET, 0))
+    layout = lay_out(placed, fade_px=10.0, crop='valid')
+    gain = GainCompensation(layout, placed, pictures)
+    compositor = Compositor(layout, placed, gain=gain)
     out = np.empty((layout.surface.height, layout.surface.width, 3), np.uint8)
     dimmed = [pictures[0], pictures[1] // 2]
     for _ in range(60):
@@ -138,40 +154,52 @@ def test_a_picture_that_is_not_live_does_not_change_the_gain(pictures):
 
 
 def test_both_ways_give_the_same_picture(pictures):
-    raw = composed(*views_of(pictures, corrected=False), offset_px=round(OFFSET), crop='none')[1]
-    rect = composed(*views_of(pictures, corrected=True), offset_px=round(OFFSET), crop='none')[1]
+    raw = composed(*views_of(pictures, corrected=False), offset_px=round(OFFSET), crop='none')[2]
+    rect = composed(*views_of(pictures, corrected=True), offset_px=round(OFFSET), crop='none')[2]
     # Corrected pictures mark black pixels that are seen with a 1.
     assert np.abs(raw.astype(int) - rect).max() <= 2
 
 
 def test_the_center_lies_midway_between_the_axes(pictures):
     views, images = views_of(pictures, corrected=False)
-    layout, _ = composed(views, images, crop='none')
-    axes = [origin.x_px + SURFACE.center_x_px for origin in layout.origins]
+    layout, placed, _ = composed(views, images, crop='none')
+    axes = [view.axis for view in placed.views]
     assert layout.surface.center_x_px == pytest.approx(np.mean(axes))
     assert axes[1] - axes[0] == pytest.approx(OFFSET)
 
 
 def test_none_lays_the_right_frame_over_the_left(pictures):
-    views, images = views_of(pictures, corrected=True)
+    _, images = views_of(pictures, corrected=True)
     x = round(OFFSET)
-    _, out = composed(views, images, x, fade_px=0.0, crop='none')
+    *_, out = composed([View(SURFACE, SURFACE)] * 2, images, x, fade_px=0.0, crop='none')
     assert (out[:, :x] == images[0][:, :x]).all()
     assert (out[:, x:] == images[1]).all()
 
 
+@pytest.mark.parametrize('corrected', [False, True])
+def test_none_cuts_where_both_show_most(pictures, corrected):
+    views, images = views_of(pictures, corrected)
+    layout, placed, _ = composed(views, images, round(OFFSET), fade_px=0.0, crop='none')
+    begin, end = placed.views[1].begin, placed.views[0].end
+    columns = slice(begin, end)
+    rows = slice(0, layout.surface.height)
+    both = placed.views[0].shows(rows, columns) & placed.views[1].shows(rows, columns)
+    shown = both.sum(axis=0)
+    assert shown[layout.seams[0].begin - begin] >= 0.98 * shown.max() > 1.1 * shown[0]
+
+
 def test_frames_without_overlap_stand_side_by_side(pictures):
     views, images = views_of(pictures, corrected=True)
-    layout, out = composed(views, images, SURFACE.width, crop='none')
+    placed = placed_at(views, (SURFACE.width, 0), found=False)
+    layout, _, out = drawn(lay_out(placed, fade_px=10.0, crop='none'), placed, images)
     assert (out == np.hstack(images)).all()
     assert layout.seams[0].begin == layout.seams[0].end == SURFACE.width
 
 
 def test_a_vertical_offset_moves_the_right_frame_down(pictures):
     views, images = views_of(pictures, corrected=True)
-    layout = lay_out(views, [(SURFACE.width, 7.0)], fade_px=0.0, crop='none')
-    out = np.empty((layout.surface.height, layout.surface.width, 3), np.uint8)
-    Compositor(layout, views).compose(images, out)
+    placed = placed_at(views, (SURFACE.width, 7), found=False)
+    layout, _, out = drawn(lay_out(placed, fade_px=0.0, crop='none'), placed, images)
     assert layout.surface.height == SURFACE.height + 7
     assert (out[7:, SURFACE.width :] == images[1]).all()
     assert (out[:7, SURFACE.width :] == 0).all()
@@ -185,10 +213,11 @@ def test_a_turned_camera_is_levelled():
         Scene().view(LENS, attitude).frame(STAMP_NS),
     ]
     level = [View(LENS, SURFACE)] * 2
-    turned = [level[0], replace(level[1], turn=turn)]
+    tilted = Overlap('true', True, OFFSET, 0.0, turn)
     quality = []
-    for views in (level, turned):
-        layout, out = composed(views, images)
+    for overlap in (replace(tilted, turn=LEVEL), tilted):
+        placed = place(views_at_overlaps(level, [overlap]))
+        layout, _, out = drawn(lay_out(placed, fade_px=10.0, crop='valid'), placed, images)
         truth = Scene().view(layout.surface).frame(STAMP_NS)
         quality.append(psnr(out, truth, np.s_[:]))
     assert quality[1] > FAITHFUL_DB > quality[0]
@@ -198,9 +227,8 @@ def test_a_seam_between_views_of_different_brightness_is_a_ramp():
     views = [View(SURFACE, SURFACE)] * 2
     shape = SURFACE.height, SURFACE.width
     images = [np.full(shape, 60, np.uint8), np.full(shape, 160, np.uint8)]
-    layout = lay_out(views, [(OFFSET, 0.0)], fade_px=20.0, crop='none')
-    out = np.empty((layout.surface.height, layout.surface.width), np.uint8)
-    Compositor(layout, views).compose(images, out)
+    placed = placed_at(views, (OFFSET, 0))
+    layout, _, out = drawn(lay_out(placed, fade_px=20.0, crop='none'), placed, images)
     begin, end = layout.seams[0]
     steps = np.diff(out[:, begin - 2 : end + 2].astype(int), axis=1)
     assert end - begin == 20
@@ -214,9 +242,8 @@ def test_five_cameras():
     narrow = surface_for(make_lens('plumb_bob', 100, 80, [80, 0, 49.5, 0, 80, 39.5, 0, 0, 1], []))
     views = [View(narrow, narrow)] * 5
     images = [np.full((narrow.height, narrow.width), 40 * (i + 1), np.uint8) for i in range(5)]
-    layout = lay_out(views, [(narrow.width - 20, 0.0)] * 4, fade_px=8.0, crop='none')
-    out = np.empty((layout.surface.height, layout.surface.width), np.uint8)
-    Compositor(layout, views).compose(images, out)
+    placed = placed_at(views, *[(narrow.width - 20, 0)] * 4)
+    layout, _, out = drawn(lay_out(placed, fade_px=8.0, crop='none'), placed, images)
     assert layout.surface.width == 5 * narrow.width - 4 * 20
     assert sorted(set(np.unique(out)) & {40, 80, 120, 160, 200}) == [40, 80, 120, 160, 200]
     assert (np.diff(out.astype(int), axis=1) >= 0).all()
@@ -232,7 +259,7 @@ def test_a_picture_of_another_size_is_refused(pictures, corrected):
 def test_grey_pictures_give_a_grey_panorama(pictures):
     views, images = views_of(pictures, corrected=False)
     grey = [cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) for image in images]
-    layout = lay_out(views, [(OFFSET, 0.0)], fade_px=10.0, crop='valid')
-    out = np.empty((layout.surface.height, layout.surface.width), np.uint8)
-    Compositor(layout, views).compose(grey, out)
+    placed = placed_at(views, (OFFSET, 0))
+    layout = lay_out(placed, fade_px=10.0, crop='valid')
+    _, _, out = drawn(layout, placed, grey)
     assert out.min() > 0

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scenes import placed_at
 
 from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens
@@ -16,7 +17,8 @@ YAW = np.radians(140)
 LENS = synthetic_lens(320, 240, np.radians(170))
 SURFACE = surface_for(LENS)
 VIEWS = [View(LENS, SURFACE)] * 2
-LAYOUT = lay_out(VIEWS, [(YAW * SURFACE.focal_px, 0.0)], fade_px=8.0, crop='valid')
+PLACED = placed_at(VIEWS, (YAW * SURFACE.focal_px, 0))
+LAYOUT = lay_out(PLACED, fade_px=8.0, crop='valid')
 RIGHT = 0.01
 """A relative error of a factor that costs a grey level in what is bright."""
 UNSEEN_LEVELS = 0.5
@@ -35,20 +37,20 @@ def pictures(left=1.0, right=1.0):
 
 @pytest.mark.parametrize(('left', 'right'), [(1.0, 1.3), (1.2, 0.8)])
 def test_the_brighter_camera_is_darkened(left, right):
-    factors = GainCompensation(LAYOUT, VIEWS, pictures(left, right)).factors
+    factors = GainCompensation(LAYOUT, PLACED, pictures(left, right)).factors
     assert factors[0] / factors[1] == pytest.approx(np.full(3, right / left), rel=RIGHT)
     assert factors.max() == 1.0
 
 
 def test_where_the_sky_is_clipped_white_stays_white():
-    factors = GainCompensation(LAYOUT, VIEWS, pictures(1.0, 1.8)).factors
+    factors = GainCompensation(LAYOUT, PLACED, pictures(1.0, 1.8)).factors
     assert factors[0] == pytest.approx(np.full(3, 1.8), rel=RIGHT)
     assert (factors[1] == 1.0).all()
 
 
 def test_a_tint_is_taken_out():
     tint = np.array([0.9, 1.0, 1.08])
-    gain = GainCompensation(LAYOUT, VIEWS, pictures(right=tint))
+    gain = GainCompensation(LAYOUT, PLACED, pictures(right=tint))
     ratio = gain.factors[0] / gain.factors[1]
     assert ratio == pytest.approx(tint, rel=RIGHT)
     drawn = np.full((100, LAYOUT.drawn(1)[1] - LAYOUT.drawn(1)[0], 3), 100, np.uint8)
@@ -60,19 +62,19 @@ def test_a_tint_is_taken_out():
 def test_what_one_camera_shows_alone_does_not_count():
     images = pictures(1.0, 1.3)
     images[0][60:160, 240:] = 250
-    factors = GainCompensation(LAYOUT, VIEWS, images).factors
+    factors = GainCompensation(LAYOUT, PLACED, images).factors
     assert factors[0] / factors[1] == pytest.approx(np.full(3, 1.3), rel=RIGHT)
 
 
 def test_equal_cameras_are_left_alone():
-    gain = GainCompensation(LAYOUT, VIEWS, pictures())
+    gain = GainCompensation(LAYOUT, PLACED, pictures())
     drawn = np.arange(60, dtype=np.uint8).reshape(4, 5, 3)
     gain.apply(0, drawn)
     assert (drawn.ravel() == np.arange(60)).all()
 
 
 def test_it_follows_a_change_of_exposure_without_a_jump():
-    gain = GainCompensation(LAYOUT, VIEWS, pictures())
+    gain = GainCompensation(LAYOUT, PLACED, pictures())
     images = pictures(1.0, 1.3)
     relations = []
     for _ in range(240):
@@ -87,8 +89,8 @@ def test_it_follows_a_change_of_exposure_without_a_jump():
 def test_noise_and_a_passer_by_do_not_flicker():
     noise = np.random.default_rng(3)
     clean = pictures(1.0, 1.3)
-    gain = GainCompensation(LAYOUT, VIEWS, clean)
-    compositor = Compositor(LAYOUT, VIEWS, gain=gain)
+    gain = GainCompensation(LAYOUT, PLACED, clean)
+    compositor = Compositor(LAYOUT, PLACED, gain=gain)
     out = np.empty((LAYOUT.surface.height, LAYOUT.surface.width, 3), np.uint8)
     seam, brightness = slice(*LAYOUT.seams[0]), []
     for i in range(64):
@@ -102,7 +104,7 @@ def test_noise_and_a_passer_by_do_not_flicker():
 
 def test_grey_pictures():
     images = [image[..., 1] for image in pictures(1.0, 1.3)]
-    gain = GainCompensation(LAYOUT, VIEWS, images)
+    gain = GainCompensation(LAYOUT, PLACED, images)
     assert gain.factors == pytest.approx(np.array([[1.0], [1 / 1.3]]), rel=RIGHT)
     drawn = np.full((10, 20), 130, np.uint8)
     gain.apply(1, drawn)
@@ -110,29 +112,32 @@ def test_grey_pictures():
 
 
 def test_a_chain_of_cameras_is_evened_out_to_one():
-    offsets = [(np.radians(120) * SURFACE.focal_px, 0.0)] * 2
+    offsets = [(np.radians(120) * SURFACE.focal_px, 0)] * 2
     views = [View(LENS, SURFACE)] * 3
-    layout = lay_out(views, offsets, fade_px=8.0, crop='valid')
+    placed = placed_at(views, *offsets)
+    layout = lay_out(placed, fade_px=8.0, crop='valid')
     images = [
         (Scene().view(LENS, Turn(yaw_rad=np.radians(yaw))).frame(0) * exposure).astype(np.uint8)
         for yaw, exposure in ((-120, 1.1), (0, 0.9), (120, 1.2))
     ]
-    factors = GainCompensation(layout, views, images).factors[:, 0]
+    factors = GainCompensation(layout, placed, images).factors[:, 0]
     assert factors == pytest.approx([0.9 / 1.1, 1.0, 0.9 / 1.2], rel=RIGHT)
 
 
 def test_a_camera_that_shows_nothing_is_left_out():
-    offsets = [(np.radians(120) * SURFACE.focal_px, 0.0)] * 2
+    offsets = [(np.radians(120) * SURFACE.focal_px, 0)] * 2
     views = [View(LENS, SURFACE)] * 3
-    layout = lay_out(views, offsets, fade_px=8.0, crop='valid')
+    placed = placed_at(views, *offsets)
+    layout = lay_out(placed, fade_px=8.0, crop='valid')
     left, middle = (
         (Scene().view(LENS, Turn(yaw_rad=np.radians(yaw))).frame(0) * exposure).astype(np.uint8)
         for yaw, exposure in ((-120, 1.1), (0, 0.9))
     )
-    factors = GainCompensation(layout, views, [left, middle, np.zeros_like(left)]).factors[:, 0]
+    factors = GainCompensation(layout, placed, [left, middle, np.zeros_like(left)]).factors[:, 0]
     assert factors == pytest.approx([0.9 / 1.1, 1.0, 1.0], rel=RIGHT)
 
 
 def test_without_a_common_scene_nothing_is_changed():
-    layout = lay_out(VIEWS, [(float(SURFACE.width), 0.0)], fade_px=8.0, crop='none')
-    assert (GainCompensation(layout, VIEWS, pictures(1.0, 1.3)).factors == 1.0).all()
+    placed = placed_at(VIEWS, (SURFACE.width, 0), found=False)
+    layout = lay_out(placed, fade_px=8.0, crop='none')
+    assert (GainCompensation(layout, placed, pictures(1.0, 1.3)).factors == 1.0).all()

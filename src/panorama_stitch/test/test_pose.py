@@ -18,7 +18,7 @@ def test_a_point_lies_where_the_turned_picture_shows_it(kind):
     points = np.rint(shares * (surface.width, surface.height)).astype(int)
     for x, y in points:
         picture[y - 2 : y + 3, x - 2 : x + 3] = 255
-    turned = RemapTable(surface, surface, turn=turn)(picture)
+    turned = RemapTable(surface, surface, attitude=turn)(picture)
     places = Pose(7.0, -3.0, turn.pitch_rad, turn.roll_rad).place(surface, points) - (7.0, -3.0)
     for x, y in np.rint(places).astype(int):
         spot = turned[y - 6 : y + 7, x - 6 : x + 7].astype(float)

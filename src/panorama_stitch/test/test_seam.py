@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scenes import placed_at
 
 from fisheye_geometry.lens import make_lens
 from fisheye_geometry.surface import surface_for
@@ -28,8 +29,9 @@ def frames():
 
 
 def settled(images, views=VIEWS, fade_px=FADE_PX):
-    layout = lay_out(views, [(float(OFFSET_PX), 0.0)], fade_px=fade_px, crop='none')
-    return layout, settle_seams(layout, views, images)
+    placed = placed_at(views, (OFFSET_PX, 0))
+    layout = lay_out(placed, fade_px=fade_px, crop='none')
+    return layout, settle_seams(layout, placed, images)
 
 
 def test_where_the_views_agree_everywhere_it_stays_in_the_middle():

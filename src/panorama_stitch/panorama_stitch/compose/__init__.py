@@ -1,7 +1,8 @@
 """Pictures to panorama.
 
-In the order in which to read: `view` (one camera's pictures), `layout` (which columns of the
-panorama are whose), `seam` (where neighbours agree best), `blend` (how they meet there), `gain`
-(how they become equally bright), `compositor` (all of it, frame after frame). `stale` marks
-cameras that went silent; `parallel` shares the rows between threads.
+`build` is the recipe. In the order in which to read: `view` (one camera's pictures), `placing`
+(the surface around the rig, and where each camera shows anything), `layout` and `crop` (which
+columns are whose), `seam` (where neighbours agree best), `fade` and `blend` (how they meet
+there), `gain` (how they become equally bright), `compositor` (all of it, frame after frame).
+`stale` marks cameras that went silent; `parallel` shares the rows between threads.
 """

@@ -37,16 +37,24 @@ class Feather:
 
     is_local = True
 
-    def __init__(self, left_seen: np.ndarray, right_seen: np.ndarray):
+    def __init__(
+        self,
+        left_seen: np.ndarray,
+        right_seen: np.ndarray,
+        fade: tuple[int, int] | None = None,
+    ):
         """Prepare.
 
         Parameters
         ----------
         left_seen, right_seen
             (height, width) bool: where each view shows anything; elsewhere the other is alone.
+        fade
+            Columns [begin, end) of these in which one view gives way to the other; None: all.
         """
-        width = left_seen.shape[1]
-        ramp = (np.arange(width, dtype=np.float32) + 0.5) / width
+        begin, end = fade or (0, left_seen.shape[1])
+        columns = np.arange(left_seen.shape[1], dtype=np.float32) + 0.5 - begin
+        ramp = (columns / max(end - begin, 1e-3)).clip(0, 1)
         weights = left_seen * (1 - ramp), right_seen * ramp
         # Where no view shows anything it stays black with any weights.
         total = np.maximum(weights[0] + weights[1], np.finfo(np.float32).tiny)
@@ -68,14 +76,20 @@ class Multiband:
 
     is_local = False
 
-    def __init__(self, left_seen: np.ndarray, right_seen: np.ndarray):
+    def __init__(
+        self,
+        left_seen: np.ndarray,
+        right_seen: np.ndarray,
+        fade: tuple[int, int] | None = None,
+    ):
         """Prepare; parameters as of `Feather`."""
         height, width = left_seen.shape
+        begin, end = fade or (0, width)
         self._left_alone = (left_seen & ~right_seen).astype(np.uint8)
         self._right_alone = (right_seen & ~left_seen).astype(np.uint8)
-        left_half = np.tile(np.arange(width) < width / 2, (height, 1))
+        left_half = np.tile(np.arange(width) < (begin + end) / 2, (height, 1))
         self._weights = [left_half.astype(np.float32)]
-        for _ in range(max(1, int(log2(width / _COARSEST_COLUMNS)))):
+        for _ in range(max(1, int(log2(max(1, end - begin) / _COARSEST_COLUMNS)))):
             self._weights.append(cv2.pyrDown(self._weights[-1]))
         self._levels: list[_Level] = []
         self._shape: tuple[int, ...] = ()

@@ -8,13 +8,15 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from panorama_stitch.compose.blend import Blend, Feather, Multiband
+from panorama_stitch.compose.blend import Feather, Multiband
+from panorama_stitch.compose.fade import Fade
 from panorama_stitch.compose.gain import GainCompensation
-from panorama_stitch.compose.layout import Layout, Seam
+from panorama_stitch.compose.layout import Layout, neighbours, wrapped
 from panorama_stitch.compose.parallel import share
-from panorama_stitch.compose.view import Cut, View
+from panorama_stitch.compose.placing import Placed, PlacedView
+from panorama_stitch.compose.view import Cut
 
-_BLENDS = {'feather': Feather, 'multiband': Multiband}
+_BLENDS = {'none': Feather, 'feather': Feather, 'multiband': Multiband}
 BLENDS = {'none': 0.0, 'feather': 1.0, 'multiband': 4.0}
 """The ways to blend, and the width of the strip that each needs in units of `feather_deg`."""
 _ALL_ROWS = slice(None)
@@ -30,14 +32,16 @@ class Compositor:
 
     Attributes
     ----------
-    layout, views, gain
+    layout, gain
         What it was made from.
+    views
+        Of the cameras in the rig's order.
     """
 
     def __init__(
         self,
         layout: Layout,
-        views: Sequence[View],
+        placed: Placed,
         blend: str = 'feather',
         gain: GainCompensation | None = None,
     ):
@@ -45,24 +49,27 @@ class Compositor:
 
         Parameters
         ----------
-        layout, views
-            What to draw where.
+        layout, placed
+            What to draw where; the tables of `placed` are not needed any more afterwards.
         blend
             How to blend seams that have a width, one of `BLENDS`.
         gain
             Keeps the views equally bright; None: they are drawn as they are.
         """
         self.layout = layout
-        self.views = tuple(views)
         self.gain = gain
-        self._fades = [_Fade(i, layout, views, blend) for i in range(len(layout.seams))]
+        self.views = tuple(p.view for p in sorted(placed.views, key=lambda view: view.index))
+        self._fades = [
+            Fade(layout, seam, pair, _BLENDS[blend])
+            for seam, pair in zip(layout.seams, neighbours(placed), strict=True)
+        ]
         count = min(cv2.getNumberOfCPUs(), _MOST_SLABS)
         edges = np.linspace(0, layout.surface.height, count + 1)
         slabs = [slice(*rows) for rows in pairwise(edges.round().astype(int))]
         self._parts: list[list[_Part]] = [[] for _ in slabs]
         share(
             [
-                partial(self._prepare, parts, rows)
+                partial(self._prepare, placed, parts, rows)
                 for parts, rows in zip(self._parts, slabs, strict=True)
             ]
         )
@@ -97,71 +104,77 @@ class Compositor:
             if not fade.is_local:
                 fade.blend(_ALL_ROWS, out)
 
-    def _prepare(self, parts: list['_Part'], rows: slice) -> None:
-        for index, (view, origin) in enumerate(zip(self.views, self.layout.origins, strict=True)):
-            begin, end = self.layout.drawn(index)
-            if end > begin:
-                size = end - begin, rows.stop - rows.start
-                cut = view.cut(begin - origin.x_px, rows.start - origin.y_px, *size)
-                parts.append(_Part(index, rows, slice(begin, end), cut))
+    def _prepare(self, placed: Placed, parts: list['_Part'], rows: slice) -> None:
+        """Cut the tables of some rows: each view after its left neighbour, over which it fades."""
+        fades = self._fades
+        closing = fades[-1] if placed.wraps and fades else None
+        for at, view in enumerate(placed.views):
+            begin, end = self._columns(at, view)
+            fade = fades[at - 1] if at else None
+            if closing and not at:
+                # The first view fades over the last one, which has to be drawn before.
+                begin = closing.end - self.layout.surface.width
+            parts += self._cut(view, rows, (begin, end), fade)
+        if closing:
+            begin, end = (edge - self.layout.surface.width for edge in closing.columns)
+            parts += self._cut(placed.views[0], rows, (begin, end), closing)
+
+    def _columns(self, at: int, view: PlacedView) -> tuple[int, int]:
+        """Columns in which a view is drawn, those in which it fades among them."""
+        begin, end = self.layout.drawn(view.index)
+        if at:
+            begin = self._fades[at - 1].begin
+        if at < len(self._fades):
+            end = self._fades[at].end
+        return begin, end
+
+    def _cut(
+        self, view: PlacedView, rows: slice, columns: tuple[int, int], fade: Fade | None
+    ) -> list['_Part']:
+        """Parts of a view in some columns, cut where it ends and at the panorama's edges."""
+        x, y = self.layout.origin
+        parts = []
+        for begin, end, is_seen in pieces(columns, (view.begin - x, view.end - x)):
+            at = begin
+            for first, last in wrapped(begin, end, self.layout.surface.width):
+                source = slice(at + x, at + x + last - first)
+                cut = view.cut(slice(rows.start + y, rows.stop + y), source) if is_seen else None
+                parts.append(_Part(view.index, rows, slice(first, last), cut))
+                at += last - first
+        if parts and fade:
+            parts[0] = parts[0]._replace(keep=fade)
+            parts[-1] = parts[-1]._replace(blend=fade)
+        return parts
 
     def _draw(self, parts: Sequence['_Part'], images: Sequence[np.ndarray], out, gain):
-        for index, rows, columns, cut in parts:
+        for index, rows, columns, cut, keep, blend in parts:
             drawn = out[rows, columns]
-            if index:
-                self._fades[index - 1].keep(rows, out)
-            cut(images[index], drawn)
-            if gain:
-                gain.apply(index, drawn)
-            if index and self._fades[index - 1].is_local:
-                self._fades[index - 1].blend(rows, out)
+            if keep:
+                keep.keep(rows, out)
+            if cut is None:
+                drawn[:] = 0
+            else:
+                cut(images[index], drawn)
+                if gain:
+                    gain.apply(index, drawn)
+            if blend and blend.is_local:
+                blend.blend(rows, out)
 
 
 class _Part(NamedTuple):
-    """Where one thread draws how much of a view."""
+    """Where one thread draws how much of a view, and which seam it begins and ends there."""
 
     index: int
     rows: slice
     columns: slice
-    cut: Cut
+    cut: Cut | None
+    keep: Fade | None = None
+    blend: Fade | None = None
 
 
-class _Fade:
-    """The seam between two views: the right one is drawn over the left one, which is kept."""
-
-    def __init__(self, index: int, layout: Layout, views: Sequence[View], blend: str):
-        seam = layout.seams[index]
-        self._columns = slice(*seam)
-        self._left = np.empty(0, np.uint8)
-        self._blend: Blend | None = None
-        if seam.end > seam.begin:
-            seen = [_seen(views[i], layout, i, seam) for i in (index, index + 1)]
-            self._blend = _BLENDS[blend](*seen)
-
-    def expect(self, out: np.ndarray) -> None:
-        """Make room for the left view of a panorama."""
-        shape = out[:, self._columns].shape
-        if self._left.shape != shape:
-            self._left = np.empty(shape, np.uint8)
-
-    def keep(self, rows: slice, out: np.ndarray) -> None:
-        """Keep some rows of the left view before the right one is drawn."""
-        self._left[rows] = out[rows, self._columns]
-
-    @property
-    def is_local(self) -> bool:
-        """Whether some rows can be blended while others are not drawn yet."""
-        return self._blend is not None and self._blend.is_local
-
-    def blend(self, rows: slice, out: np.ndarray) -> None:
-        """Blend some rows of the views."""
-        if self._blend:
-            self._blend(self._left[rows], out[rows, self._columns], rows)
-
-
-def _seen(view: View, layout: Layout, index: int, seam: Seam) -> np.ndarray:
-    """(height, seam's width) bool: where a view shows anything in a seam."""
-    origin, height = layout.origins[index], layout.surface.height
-    width = seam.end - seam.begin
-    cut = view.cut(seam.begin - origin.x_px, -origin.y_px, width, height)
-    return view.shown(cut, (height, width))
+def pieces(columns: tuple[int, int], seen: tuple[int, int]) -> list[tuple[int, int, bool]]:
+    """Cut columns into those before, in and after some others, and tell which are in them."""
+    begin, end = columns
+    edges = [begin, *(min(max(edge, begin), end) for edge in seen), end]
+    cuts = zip(pairwise(edges), (False, True, False), strict=True)
+    return [(first, last, is_in) for (first, last), is_in in cuts if last > first]

@@ -12,8 +12,8 @@ from math import sqrt
 import cv2
 import numpy as np
 
-from panorama_stitch.compose.layout import Layout
-from panorama_stitch.compose.view import View
+from panorama_stitch.compose.layout import Layout, neighbours, shared
+from panorama_stitch.compose.placing import Placed, PlacedView
 
 _AROUND_SEAM_DEG = 12.0
 """Width of the overlap in which brightness is compared."""
@@ -32,6 +32,8 @@ _SMOOTHING = 0.25
 _SMALLEST_CHANGE, _SMALLEST_TINT = 0.002, 0.01
 """Factors that differ less from 1 are not worth the time; and from each other."""
 _LARGEST_FACTOR = 4.0
+_UNKNOWN = 1e-3
+"""Weight in a ring of a pair that was never compared."""
 _ROWS = 64
 """Rows that are multiplied at once by factors that differ between channels."""
 
@@ -48,11 +50,14 @@ class GainCompensation:
         Of the pictures that it is for.
     """
 
-    def __init__(self, layout: Layout, views: Sequence[View], group: Sequence[np.ndarray]):
+    def __init__(self, layout: Layout, placed: Placed, group: Sequence[np.ndarray]):
         """Prepare, and compare a group of pictures (height, width[, channels]), one a camera."""
         self.channels = channels = 1 if group[0].ndim == 2 else group[0].shape[2]
-        self._pairs = [_Pair(layout, views, i, channels) for i in range(len(layout.seams))]
-        widths = [end - begin for begin, end in map(layout.drawn, range(len(views)))]
+        self._pairs = [
+            _Pair(layout, sum(seam) / 2, pair, channels)
+            for seam, pair in zip(layout.seams, neighbours(placed), strict=True)
+        ]
+        widths = [layout.surface.width] * len(group)
         self._multipliers = [_Multiplier(width, channels) for width in widths]
         self._age = 0
         for pair in self._pairs:
@@ -89,11 +94,27 @@ class GainCompensation:
         ratios = np.stack([pair.log_ratio for pair in self._pairs])
         if not self._in_color:
             ratios = np.broadcast_to(ratios.mean(axis=1, keepdims=True), ratios.shape)
-        return np.concatenate([np.zeros((1, ratios.shape[1])), np.cumsum(ratios, axis=0)])
+        weights = [1.0 if pair.is_known else _UNKNOWN for pair in self._pairs]
+        cameras = [pair.cameras for pair in self._pairs]
+        return _solution(cameras, weights, len(self._multipliers)) @ ratios
 
     def _use_needed(self) -> None:
         for multiplier, factors in zip(self._multipliers, self.factors, strict=True):
             multiplier.set(factors)
+
+
+def _solution(pairs: Sequence[tuple[int, int]], weights: Sequence[float], cameras: int):
+    """Return what takes ratios of pairs to logarithms of factors, (cameras, pairs).
+
+    A chain is followed; around a ring, where the ratios contradict each other, the factors are
+    those that fit best.
+    """
+    steps = np.zeros((len(pairs), cameras))
+    for row, (left, right) in zip(steps, pairs, strict=True):
+        row[right] += 1
+        row[left] -= 1
+    weights = np.asarray(weights)
+    return np.linalg.pinv(steps * weights[:, None]) * weights
 
 
 class _Pair:
@@ -101,37 +122,49 @@ class _Pair:
 
     Attributes
     ----------
+    cameras : tuple of int
+        Indices of the left and the right one.
     log_ratio : ndarray
         (channels,) logarithm of what the right one has to be multiplied by; 0 until it is known.
     clipped : float
         Share of the samples that were clipped in one of the views last time.
     """
 
-    def __init__(self, layout: Layout, views: Sequence[View], index: int, channels: int):
-        surface, seam = layout.surface, layout.seams[index]
-        left, right = layout.origins[index : index + 2]
-        middle, half = sum(seam) / 2, np.radians(_AROUND_SEAM_DEG / 2) * surface.focal_px
-        begin = max(right.x_px, middle - half)
-        end = min(left.x_px + views[index].surface.width, middle + half)
+    def __init__(
+        self,
+        layout: Layout,
+        middle: float,
+        pair: tuple[PlacedView, PlacedView, int],
+        channels: int,
+    ):
+        left, right, turn_px = pair
+        surface, x = layout.surface, layout.origin[0]
+        half = np.radians(_AROUND_SEAM_DEG / 2) * surface.focal_px
+        begin, end = (edge - x for edge in shared(left, right, turn_px))
+        begin, end = round(max(begin, middle - half)), round(min(end, middle + half))
         self.clipped = 0.0
         self.log_ratio = np.zeros(channels)
+        self.cameras = left.index, right.index
         self._history: deque[np.ndarray] = deque(maxlen=_MEDIAN_OF)
-        self._index = index
-        width, height = max(1, round(end - begin)), surface.height
-        step = max(1.0, sqrt(width * height / _SAMPLES))
+        step = max(1.0, sqrt(max(1, end - begin) * surface.height / _SAMPLES))
         self._samples = [
-            view.samples(begin - origin.x_px, -origin.y_px, width, height, step)
-            for view, origin in ((views[index], left), (views[index + 1], right))
+            view.samples(surface, (begin - moved, end - moved), step)
+            for view, moved in ((left, 0), (right, turn_px))
         ]
-        seen = [
-            view.shown(samples, samples.valid.shape)
-            for view, samples in zip(views[index : index + 2], self._samples, strict=True)
-        ]
-        self._seen = (seen[0] & seen[1]).ravel() & (end > begin)
+        self._seen = np.full(self._samples[0].valid.size, end > begin)
+        for view, samples in zip((left, right), self._samples, strict=True):
+            self._seen &= view.view.shows_scene(samples).ravel()
+
+    @property
+    def is_known(self) -> bool:
+        """Whether the pair was compared at all."""
+        return bool(self._history)
 
     def compare(self, images: Sequence[np.ndarray]) -> None:
         """Learn from pictures, one of each camera."""
-        ratio = self._ratio(*(self._planes(i, images[self._index + i]) for i in (0, 1)))
+        ratio = self._ratio(
+            *(self._planes(i, images[camera]) for i, camera in enumerate(self.cameras))
+        )
         if ratio is None:
             return
         self._history.append(np.log(ratio))
@@ -180,6 +213,11 @@ class _Multiplier:
         if not self._is_grey:
             for top in range(0, len(drawn), _ROWS):
                 part = drawn[top : top + _ROWS]
-                cv2.multiply(part, self._weights[: len(part)], dst=part, scale=self._scale / 255)
+                cv2.multiply(
+                    part,
+                    self._weights[: len(part), : part.shape[1]],
+                    dst=part,
+                    scale=self._scale / 255,
+                )
         elif abs(self._scale - 1) > _SMALLEST_CHANGE:
             cv2.convertScaleAbs(drawn, dst=drawn, alpha=self._scale)

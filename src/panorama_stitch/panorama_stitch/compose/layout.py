@@ -1,31 +1,27 @@
-"""Layout: where each camera's view lies in the panorama, and where one gives way to the next."""
+"""Layout: which columns of the panorama are whose, and where one camera gives way to the next."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import ceil
+from math import ceil, floor
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 
 from fisheye_geometry.surface import Surface
-from panorama_stitch.compose.view import View
+from panorama_stitch.compose.crop import CROPS, valid_rectangle
+from panorama_stitch.compose.placing import Placed, PlacedView
 
-CROPS = ('valid', 'none')
-_MAX_TRIM_DEG = 3.0
-"""Columns at the far left and right that a crop may give up to gain rows."""
+__all__ = ['CROPS', 'Layout', 'Seam', 'covered', 'lay_out']
 
-
-class Origin(NamedTuple):
-    """Where the upper left pixel of a view lies, px of the first view."""
-
-    x_px: float
-    y_px: float
+_NEARLY_MOST = 0.98
+"""Columns in which both cameras show so much of the most are as good as the best one."""
 
 
 class Seam(NamedTuple):
-    """Columns of the panorama in which a view fades into its right neighbour."""
+    """Columns of the panorama in which a view fades into its right neighbour.
+
+    On a closed panorama they may go beyond its right edge, where its left one follows.
+    """
 
     begin: int
     end: int
@@ -33,147 +29,151 @@ class Seam(NamedTuple):
 
 @dataclass(frozen=True)
 class Layout:
-    """Places for the views of all cameras.
+    """The columns of all cameras.
 
     Attributes
     ----------
     surface
-        What the panorama shows; its centre lies midway between the first axis and the last.
-    origins
-        Of each view, relative to the panorama's upper left pixel.
+        What the panorama shows.
+    order
+        Indices of the cameras as they follow each other from left to right.
     seams
-        One for each neighbouring pair, from left to right.
+        One for each camera of `order` and the next one; the closing seam last.
+    wraps
+        Whether the right edge of the panorama meets its left one.
+    origin
+        Column and row of the whole panorama, as it was placed, at which this one begins.
     """
 
     surface: Surface
-    origins: tuple[Origin, ...]
+    order: tuple[int, ...]
     seams: tuple[Seam, ...]
+    wraps: bool = False
+    origin: tuple[int, int] = (0, 0)
 
     def drawn(self, index: int) -> tuple[int, int]:
-        """Columns [begin, end) in which view `index` is drawn, those of its seams among them."""
-        begin = self.seams[index - 1].begin if index else 0
-        end = self.seams[index].end if index < len(self.seams) else self.surface.width
-        return begin, end
+        """Columns [begin, end) in which a camera is drawn, those of its seams among them.
+
+        On a closed panorama `begin` may be negative.
+        """
+        at, last, width = self.order.index(index), len(self.order) - 1, self.surface.width
+        if not self.wraps:
+            begin = self.seams[at - 1].begin if at else 0
+            return begin, self.seams[at].end if at < last else width
+        if not self.seams:
+            return 0, width
+        return self.seams[at - 1].begin - (0 if at else width), self.seams[at].end
+
+    def shown_columns(self, index: int) -> tuple[int, int]:
+        """Columns of the picture in which a camera is drawn: the wider part if it is in two."""
+        begin, end = self.drawn(index)
+        return max(wrapped(begin, end, self.surface.width), key=lambda part: part[1] - part[0])
 
 
-def lay_out(
-    views: Sequence[View],
-    offsets: Sequence[tuple[float, float]],
-    *,
-    fade_px: float,
-    crop: str,
-) -> Layout:
-    """Place the views beside each other.
+def wrapped(begin: int, end: int, width: int) -> list[tuple[int, int]]:
+    """Cut columns that may lie beyond the edges of a closed panorama into those that are in it."""
+    parts = []
+    while begin < end:
+        at = begin % width
+        stop = min(end, begin + width - at)
+        parts.append((at, at + stop - begin))
+        begin = stop
+    return parts
+
+
+def lay_out(placed: Placed, *, fade_px: float, crop: str) -> Layout:
+    """Divide the columns of a panorama between its cameras.
 
     Parameters
     ----------
-    views
-        From left to right, on surfaces of one kind and focal length.
-    offsets
-        For each neighbouring pair: where the right view's upper left pixel lies in the left one.
+    placed
+        What each camera shows where.
     fade_px
-        Width of the fade in the middle of an overlap; 0: the right view lies over the left one,
-        as published.
+        Width of the fade in the middle of an overlap; 0: one camera gives way to the next at
+        once, where both show most.
     crop
-        'valid': the panorama keeps the rows and columns that hold a picture everywhere;
-        'none': everything.
+        One of `CROPS`. 'valid': the panorama keeps the rows and columns that hold a picture
+        everywhere; 'none': everything.
     """
-    origins = [Origin(0.0, 0.0)]
-    for x_px, y_px in offsets:
-        origins.append(Origin(origins[-1].x_px + x_px, origins[-1].y_px + y_px))
-    spans = [
-        (o.x_px, o.y_px, o.x_px + v.surface.width, o.y_px + v.surface.height)
-        for o, v in zip(origins, views, strict=True)
-    ]
-    left, top, right, bottom = (
-        round(pick(values))
-        for pick, values in zip((min, min, max, max), zip(*spans, strict=True), strict=True)
+    seams: list[Seam] = []
+    for left, right, turn_px in neighbours(placed):
+        seam = _seam(left, right, turn_px, fade_px)
+        if seams:
+            seam = Seam(*(max(edge, seams[-1].end) for edge in seam))
+        seams.append(seam)
+    order = tuple(view.index for view in placed.views)
+    layout = Layout(placed.surface, order, tuple(seams), placed.wraps)
+    return layout if crop == 'none' else _cropped(layout, placed)
+
+
+def neighbours(placed: Placed) -> list[tuple[PlacedView, PlacedView, int]]:
+    """Each view and the next, and how far the next one's columns have to be moved to be there."""
+    pairs = [(left, right, 0) for left, right in pairwise(placed.views)]
+    if placed.wraps and len(placed.views) > 1:
+        pairs.append((placed.views[-1], placed.views[0], placed.surface.width))
+    return pairs
+
+
+def between(left: PlacedView, right: PlacedView, turn_px: int) -> tuple[int, int]:
+    """Those of the columns that both may show that lie between their axes: a seam's place."""
+    begin, end = shared(left, right, turn_px)
+    return max(begin, ceil(left.axis)), min(end, floor(right.axis) + turn_px)
+
+
+def shared(left: PlacedView, right: PlacedView, turn_px: int) -> tuple[int, int]:
+    """Columns [begin, end) in which two neighbours may both show something; of the left one."""
+    return max(left.begin, right.begin + turn_px), min(left.end, right.end + turn_px)
+
+
+def _seam(left: PlacedView, right: PlacedView, turn_px: int, fade_px: float) -> Seam:
+    """Put the fade where both views show most, as near to the middle as that is."""
+    begin, end = shared(left, right, turn_px)
+    if fade_px:
+        begin, end = between(left, right, turn_px)
+    if begin >= end:
+        return Seam(right.begin + turn_px, right.begin + turn_px)
+    both = left.valid[:, begin - left.begin : end - left.begin]
+    both = both & right.valid[:, begin - turn_px - right.begin : end - turn_px - right.begin]
+    most = both.sum(axis=0)
+    good = np.flatnonzero(most >= _NEARLY_MOST * most.max())
+    if not fade_px:
+        return Seam(begin + int(good[0]), begin + int(good[0]))
+    middle, half = (begin + end) / 2, min(fade_px, end - begin) / 2
+    center = begin + good[np.abs(good + 0.5 + begin - middle).argmin()] + 0.5
+    if abs(center - middle) < 1:
+        center = middle
+    center = min(max(center, begin + half), end - half)
+    return Seam(round(center - half), round(center + half))
+
+
+def _cropped(layout: Layout, placed: Placed) -> Layout:
+    x, y, width, height = valid_rectangle(
+        covered(layout, placed), layout.surface, wraps=layout.wraps
     )
-    first, last = (origins[i].x_px + views[i].surface.center_x_px for i in (0, len(views) - 1))
-    surface = replace(
-        views[0].surface,
-        width=right - left,
-        height=bottom - top,
-        center_x_px=(first + last) / 2 - left,
-        center_y_px=views[0].surface.center_y_px - top,
-    )
-    layout = Layout(
-        surface,
-        tuple(Origin(o.x_px - left, o.y_px - top) for o in origins),
-        tuple(_seam(a[2] - left, b[0] - left, fade_px, right - left) for a, b in pairwise(spans)),
-    )
-    return layout if crop == 'none' else _cropped(layout, views)
-
-
-def _seam(left_end: float, right_begin: float, fade_px: float, width: int) -> Seam:
-    """Put the fade in the middle of the columns that both views share."""
-    if not fade_px or right_begin >= left_end:
-        # Drawn between its pixels, a view may lack the outermost one.
-        at = round(right_begin) if right_begin == round(right_begin) else ceil(right_begin) + 1
-        at = min(max(at, 0), width)
-        return Seam(at, at)
-    middle, half = (left_end + right_begin) / 2, min(fade_px, left_end - right_begin) / 2
-    return Seam(max(round(middle - half), 0), min(round(middle + half), width))
-
-
-def _cropped(layout: Layout, views: Sequence[View]) -> Layout:
-    x, y, width, height = _valid_rectangle(covered(layout, views), layout.surface)
-    return Layout(
-        layout.surface.window(x, y, width, height),
-        tuple(Origin(o.x_px - x, o.y_px - y) for o in layout.origins),
-        tuple(Seam(*(min(max(edge - x, 0), width) for edge in seam)) for seam in layout.seams),
+    seams = layout.seams
+    if not layout.wraps:
+        seams = tuple(Seam(*(min(max(edge - x, 0), width) for edge in seam)) for seam in seams)
+    return replace(
+        layout, surface=layout.surface.window(x, y, width, height), seams=seams, origin=(x, y)
     )
 
 
-def covered(layout: Layout, views: Sequence[View]) -> np.ndarray:
-    """(height, width) bool: where the panorama surely shows something."""
-    shape = (layout.surface.height, layout.surface.width)
-    shown = np.zeros(shape, bool)
-    for index, (view, origin) in enumerate(zip(views, layout.origins, strict=True)):
-        begin, end = layout.drawn(index)
-        x, y = round(origin.x_px), round(origin.y_px)
-        valid = view.valid()
-        if (x, y) != origin:
-            # Drawn between its pixels, a view may lack the outermost ones.
-            inner = np.ones((3, 3), np.uint8)
-            valid = cv2.erode(valid.astype(np.uint8), inner, borderValue=0).astype(bool)
-        begin, end = max(begin, x), min(end, x + valid.shape[1])
-        top, bottom = max(0, y), min(shape[0], y + valid.shape[0])
-        shown[top:bottom, begin:end] |= valid[top - y : bottom - y, begin - x : end - x]
-    return shown
+def covered(layout: Layout, placed: Placed) -> np.ndarray:
+    """(height, width) bool: where the panorama shows something."""
+    surface, (x, y) = layout.surface, layout.origin
+    result = np.zeros((surface.height, surface.width), bool)
+    rows = slice(y, y + surface.height)
+    for view in placed.views:
+        begin, end = visible(layout, view)
+        shows = view.shows(rows, slice(begin + x, max(begin, end) + x))
+        at = 0
+        for first, last in wrapped(begin, end, surface.width):
+            result[:, first:last] |= shows[:, at : at + last - first]
+            at += last - first
+    return result
 
 
-def _valid_rectangle(shown: np.ndarray, surface: Surface) -> tuple[int, int, int, int]:
-    """Largest rectangle (x, y, width, height) without a hole that keeps nearly all columns.
-
-    A driver needs the field of view to the sides, so only `_MAX_TRIM_DEG` of it are up for trade.
-    """
-    height, width = shown.shape
-    middle = int(np.clip(round(surface.center_y_px), 0, height - 1))
-    # In each column, the first and last row of the run that holds the horizon.
-    above, below = ~shown[middle::-1], ~shown[middle:]
-    top = np.where(above.any(axis=0), middle - above.argmax(axis=0) + 1, 0)
-    bottom = np.where(below.any(axis=0), middle + below.argmax(axis=0) - 1, height - 1)
-    trim = min(round(np.radians(_MAX_TRIM_DEG) * surface.focal_px), width // 8)
-    inner = slice(trim, width - trim)
-    best, rectangle = 0, (0, 0, width, height)
-    # Running limits of what each trimmed column, from the inside out, would cost.
-    left_top, left_bottom = _outward(
-        top, bottom, inner, slice(trim - 1, None, -1) if trim else slice(0)
-    )
-    right_top, right_bottom = _outward(top, bottom, inner, slice(width - trim, None))
-    for i in range(trim + 1):
-        for j in range(trim + 1):
-            first, last = max(left_top[i], right_top[j]), min(left_bottom[i], right_bottom[j])
-            area = (width - 2 * trim + i + j) * (last - first + 1)
-            if last >= first and area > best:
-                best = area
-                rectangle = (trim - i, int(first), width - 2 * trim + i + j, int(last - first + 1))
-    return rectangle
-
-
-def _outward(top, bottom, inner: slice, side: slice):
-    """Limits of the rows that remain when 0, 1, ... columns of a side join the inner ones."""
-    tops = np.concatenate([[top[inner].max()], top[side]])
-    bottoms = np.concatenate([[bottom[inner].min()], bottom[side]])
-    return np.maximum.accumulate(tops), np.minimum.accumulate(bottoms)
+def visible(layout: Layout, view: PlacedView) -> tuple[int, int]:
+    """Columns [begin, end) in which a view is drawn and may show something."""
+    (begin, end), x = layout.drawn(view.index), layout.origin[0]
+    return max(begin, view.begin - x), min(end, view.end - x)

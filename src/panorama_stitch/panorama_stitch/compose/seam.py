@@ -2,13 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import ceil, floor
 
 import cv2
 import numpy as np
 
-from panorama_stitch.compose.layout import Layout, Seam
-from panorama_stitch.compose.view import View
+from panorama_stitch.compose.layout import Layout, Seam, between, neighbours
+from panorama_stitch.compose.placing import Placed, PlacedView
 
 _LARGEST_DIFFERENCE = 40.0
 """Grey levels; what differs more is no worse."""
@@ -18,7 +17,7 @@ _SHOWN_SHARE = 0.98
 """A seam shows at least so much of both views as one in the middle of the overlap."""
 
 
-def settle_seams(layout: Layout, views: Sequence[View], group: Sequence[np.ndarray]) -> Layout:
+def settle_seams(layout: Layout, placed: Placed, group: Sequence[np.ndarray]) -> Layout:
     """Move each seam within its overlap to where the views differ least.
 
     The sides of a lens are its worst part, so that towards the edge of the overlap they have to
@@ -28,42 +27,55 @@ def settle_seams(layout: Layout, views: Sequence[View], group: Sequence[np.ndarr
     ----------
     layout
         With its seams in the middle of the overlaps.
-    views
-        From left to right.
+    placed
+        What each camera shows where.
     group
         A picture (height, width[, channels]) uint8 of each camera.
     """
-    seams = tuple(_settled(layout, views, group, index) for index in range(len(layout.seams)))
-    return replace(layout, seams=seams)
+    seams = zip(layout.seams, neighbours(placed), strict=True)
+    return replace(
+        layout, seams=tuple(_settled(layout, *pair, group, seam) for seam, pair in seams)
+    )
 
 
-def _settled(layout: Layout, views, group, index: int) -> Seam:
-    seam, surface = layout.seams[index], layout.surface
-    left, right = layout.origins[index : index + 2]
-    begin = max(ceil(right.x_px), layout.drawn(index)[0])
-    end = min(floor(left.x_px + views[index].surface.width), layout.drawn(index + 1)[1])
+def _settled(layout: Layout, left: PlacedView, right: PlacedView, turn_px: int, group, seam: Seam):
+    (x, y), surface = layout.origin, layout.surface
+    begin, end = between(left, right, turn_px)
+    if not layout.wraps:
+        begin, end = max(begin, x), min(end, x + surface.width)
     width = seam.end - seam.begin
     if not 0 < width < end - begin:
         return seam
-    shape = surface.height, end - begin
-    seen = np.ones(shape, bool)
-    pictures = []
-    for which, origin in ((index, left), (index + 1, right)):
-        cut = views[which].cut(begin - origin.x_px, -origin.y_px, *shape[::-1])
-        seen &= views[which].shown(cut, shape)
-        picture = np.empty(shape + group[which].shape[2:], np.uint8)
-        cut(group[which], picture)
+    rows = slice(y, y + surface.height)
+    seen = np.ones((surface.height, end - begin), bool)
+    pictures, shows = [], []
+    for view, moved in ((left, 0), (right, turn_px)):
+        columns = slice(begin - moved, end - moved)
+        shows.append(view.shows(rows, columns))
+        seen &= shows[-1] & ~view.shows_body(rows, columns)
+        picture = view.cut(rows, columns)(group[view.index])
         pictures.append(
             picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
         )
     shown = _over(width, seen.mean(axis=0))
     difference = _over(width, _difference(*pictures, seen)) / np.maximum(shown, 1e-3)
-    starts = begin + np.arange(len(shown))
+    starts = begin - x + np.arange(len(shown))
     off_middle = (starts - seam.begin) / ((end - begin) / 2)
     price = (difference + _NOISE) * (1 + off_middle**2)
     price[shown < _SHOWN_SHARE * shown[np.abs(off_middle).argmin()]] = np.inf
+    holes = _holes(*shows, width)
+    price[holes > holes[np.abs(off_middle).argmin()]] = np.inf
     best = int(starts[price.argmin()])
     return Seam(best, best + width)
+
+
+def _holes(left: np.ndarray, right: np.ndarray, width: int) -> np.ndarray:
+    """Pixels that stay black for each place of a seam, as views (rows, columns) show them."""
+    neither, no_left, no_right = (
+        np.concatenate([[0], (~shows).sum(axis=0).cumsum()])
+        for shows in (left | right, left, right)
+    )
+    return no_left[:-width] + neither[width:] - neither[:-width] + no_right[-1] - no_right[width:]
 
 
 def _difference(left: np.ndarray, right: np.ndarray, seen: np.ndarray) -> np.ndarray:

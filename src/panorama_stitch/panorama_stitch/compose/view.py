@@ -1,116 +1,187 @@
-"""One camera's view: its pictures, and where they lie on the surface of the panorama."""
+"""One camera's view: what its pictures show, and how they are drawn on a panorama's surface."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import pi
 
 import numpy as np
 
+from fisheye_geometry.attitude import LEVEL, Attitude
 from fisheye_geometry.errors import ImageFormatError
 from fisheye_geometry.lens import Lens
-from fisheye_geometry.remap import LEVEL, RemapTable, Turn, remap_table
+from fisheye_geometry.remap import RemapTable, remap_table
 from fisheye_geometry.surface import Surface
 
 Cut = Callable[[np.ndarray, np.ndarray], object]
-"""Draws a part of a view: takes the camera's picture and the array to draw into."""
+"""Draws a part of a panorama: takes the camera's picture and the array to draw into."""
+_SAME_FOCAL_PX = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """How one camera's pictures are corrected.
+    """How one camera's pictures are drawn.
 
     Attributes
     ----------
     source
         What the pictures show: a lens's view, or a surface if they are corrected already.
     surface
-        What they show once corrected.
+        The corrected picture of the camera alone: it says how much of what the camera sees is
+        wanted, and the first one of a rig which surface and scale the panorama has.
     interpolation
         One of `fisheye_geometry.remap.INTERPOLATIONS`.
-    turn
-        The camera's attitude against a level rig.
+    attitude
+        Takes rays of the source to rays of the panorama.
+    shift_px
+        How far to the right and down the picture is moved once it is drawn.
     seen
         (source height, source width) bool: where the pictures show anything; None for everywhere.
+    body
+        Likewise: where they show the robot itself; None for nowhere.
     """
 
     source: Lens | Surface
     surface: Surface
     interpolation: str = 'linear'
-    turn: Turn = LEVEL
+    attitude: Attitude = LEVEL
+    shift_px: tuple[float, float] = (0.0, 0.0)
     seen: np.ndarray | None = None
+    body: np.ndarray | None = None
 
     @property
     def is_corrected(self) -> bool:
-        """Whether the pictures need no warping, only placing."""
-        return self.source == self.surface and self.turn == LEVEL
+        """Whether the pictures are what `corrected` gives."""
+        return self.source == self.surface and self.attitude == LEVEL
 
     def valid(self) -> np.ndarray:
         """(surface height, surface width) bool: where the corrected picture shows anything."""
         if self.is_corrected:
-            return self._seen
-        if self.seen is None:
-            return self._table.valid
-        return self.shown(self._table, self._table.valid.shape)
+            return self.seen_pixels
+        table = remap_table(self.source, self.surface, self.interpolation, self.attitude)
+        return table.valid if self.seen is None else shown(self.seen, table, table.valid.shape)
 
     def corrected(self, image: np.ndarray) -> np.ndarray:
         """Correct a whole picture; exactly 0 where nothing is seen and nowhere else."""
         if self.is_corrected:
             return image
-        corrected = self._table(image)
-        valid = self._table.valid
+        table = remap_table(self.source, self.surface, self.interpolation, self.attitude)
+        corrected, valid = table(image), table.valid
         floor = valid if image.ndim == 2 else np.repeat(valid[..., None], image.shape[2], axis=2)
         return np.maximum(corrected, floor, out=corrected)
 
-    def cut(self, x_px: float, y_px: float, width: int, height: int) -> Cut:
-        """Prepare to draw the part of the corrected picture whose upper left pixel is (x, y)."""
-        if self.is_corrected:
-            return _Copy(round(x_px), round(y_px), width, height, self.source)
-        return self._drawn_on(self.surface.window(x_px, y_px, width, height))
+    def drawn_on(self, surface: Surface) -> 'RemapTable | Copy':
+        """Prepare to draw what a surface, perhaps a window of the panorama's, shows of the view.
 
-    def samples(
-        self, x_px: float, y_px: float, width: int, height: int, step: float
-    ) -> RemapTable:
-        """Prepare to draw only every `step`-th row and column of the same part."""
-        window = self.surface.window(x_px, y_px, width, height)
-        return self._drawn_on(window.with_focal(window.focal_px / step))
-
-    def shown(self, cut: Cut, shape: tuple[int, int]) -> np.ndarray:
-        """(height, width) bool: where a cut of that shape shows anything."""
-        drawn = np.empty(shape, np.uint8)
-        cut(self._seen.astype(np.uint8) * 255, drawn)
-        return drawn == 255
+        Corrected pictures of the same scale are copied, to whole pixels.
+        """
+        surface = surface.window(-self.shift_px[0], -self.shift_px[1], *surface.size)
+        place = self._copied_to(surface)
+        if place:
+            return Copy(*place, surface.size, self.source)
+        return RemapTable(self.source, surface, self.interpolation, self.attitude)
 
     @property
-    def _seen(self) -> np.ndarray:
+    def seen_pixels(self) -> np.ndarray:
+        """(source height, source width) bool: where the pictures show anything."""
         everywhere = np.ones((self.source.height, self.source.width), bool)
         return everywhere if self.seen is None else self.seen
 
-    @property
-    def _table(self) -> RemapTable:
-        return remap_table(self.source, self.surface, self.interpolation, self.turn)
+    def field_rad(self) -> tuple[float, float, float, float]:
+        """Return how far the wanted picture reaches to the left, right, up and down, rad.
 
-    def _drawn_on(self, surface: Surface) -> RemapTable:
-        return RemapTable(self.source, surface, self.interpolation, self.turn)
+        The sides are those of the panorama: what a camera that lies on its side has to its left
+        is up or down. To the sides it is wanted as far as it sees.
+        """
+        left, right, up, down = self.own_field_rad()
+        turned = {
+            0: (left, right, up, down),
+            1: (pi, pi, left, right),
+            2: (right, left, down, up),
+            3: (pi, pi, right, left),
+        }
+        return turned[round(self.attitude.roll_rad / (pi / 2)) % 4]
+
+    def own_field_rad(self) -> tuple[float, float, float, float]:
+        """Likewise, of an upright camera."""
+        surface = self.surface
+        x, y, focal_px = surface.center_x_px, surface.center_y_px, surface.focal_px
+        to_sides = np.array([x + 0.5, surface.width - 0.5 - x])
+        sides = np.minimum(to_sides / focal_px, pi)
+        if not surface.yaw_is_column_shift:
+            rays = surface.rays(x + to_sides, y)
+            sides = np.arctan2(rays[:, 0], rays[:, 2])
+        rays = surface.rays(x, np.array([-0.5, surface.height - 0.5]))
+        up, down = np.abs(np.arctan2(rays[:, 1], rays[:, 2]))
+        return float(sides[0]), float(sides[1]), float(up), float(down)
+
+    def shows_scene(self, table: 'RemapTable | Copy') -> np.ndarray:
+        """(height, width) bool: where a table of this view shows anything but the robot itself."""
+        valid = table.valid
+        if self.seen is not None:
+            valid = shown(self.seen, table, valid.shape)
+        if self.body is not None:
+            valid = valid & shown(~self.body, table, valid.shape)
+        return valid
+
+    def _copied_to(self, surface: Surface) -> tuple[int, int] | None:
+        """Upper left pixel of the source that a surface begins with; None if pixels are mixed."""
+        source, yaw_rad = self.source, self.attitude.yaw_rad
+        if not isinstance(source, Surface) or source.kind != surface.kind:
+            return None
+        if abs(source.focal_px - surface.focal_px) * source.width > _SAME_FOCAL_PX * 1e3:
+            return None
+        if not self.attitude.is_pure_yaw or (yaw_rad and not source.yaw_is_column_shift):
+            return None
+        x = source.center_x_px - surface.center_x_px - yaw_rad * source.focal_px
+        around = source.circumference_px
+        if source.yaw_is_column_shift:
+            # Of the places that a whole turn apart, the one nearest to the picture.
+            middle = x + (surface.width - source.width) / 2
+            x -= around * round(middle / around)
+        return round(x), round(source.center_y_px - surface.center_y_px)
 
 
-class _Copy:
+def shown(seen: np.ndarray, cut: Cut, shape: tuple[int, int]) -> np.ndarray:
+    """(height, width) bool: where a cut of that shape shows only what is seen in a source."""
+    drawn = np.empty(shape, np.uint8)
+    cut(seen.astype(np.uint8) * 255, drawn)
+    return drawn == 255
+
+
+class Copy:
     """Draws a rectangle of a corrected picture; what lies outside of it is 0."""
 
-    def __init__(self, x_px: int, y_px: int, width: int, height: int, source: Surface):
-        left, top = max(0, -x_px), max(0, -y_px)
+    def __init__(self, x_px: int, y_px: int, size: tuple[int, int], source: Surface):
+        width, height = size
+        left, top = min(max(0, -x_px), width), min(max(0, -y_px), height)
         right = max(left, min(width, source.width - x_px))
         bottom = max(top, min(height, source.height - y_px))
+        self._at = x_px, y_px
         self._to = np.s_[top:bottom, left:right]
         self._from = np.s_[top + y_px : bottom + y_px, left + x_px : right + x_px]
         self._is_whole = (left, top, right, bottom) == (0, 0, width, height)
-        self._size = source.width, source.height
+        self._source = source
+        self.valid = np.zeros((height, width), bool)
+        self.valid[self._to] = True
 
-    def __call__(self, image: np.ndarray, out: np.ndarray) -> None:
-        if image.shape[1::-1] != self._size:
+    def part(self, rows: slice, columns: slice) -> 'Copy':
+        """Prepare to draw a part of the rectangle."""
+        x, y = self._at
+        size = columns.stop - columns.start, rows.stop - rows.start
+        return Copy(x + columns.start, y + rows.start, size, self._source)
+
+    def __call__(self, image: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
+        """Draw, as a `RemapTable` does."""
+        size = self._source.width, self._source.height
+        if image.shape[1::-1] != size:
             raise ImageFormatError(
                 'the picture has {}x{} px; its projection is of {}x{} px'.format(
-                    *image.shape[1::-1], *self._size
+                    *image.shape[1::-1], *size
                 )
             )
+        if out is None:
+            out = np.empty(self.valid.shape + image.shape[2:], image.dtype)
         if not self._is_whole:
             out[:] = 0
         out[self._to] = image[self._from]
+        return out

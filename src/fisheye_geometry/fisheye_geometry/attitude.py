@@ -1,0 +1,77 @@
+"""Attitudes: how a camera is turned, as angles that a person sets and as a rotation matrix.
+
+Frames follow REP-103 for optical frames: z forward, x right, y down; a level frame has y straight
+down. NumPy and `cv2.Rodrigues` are enough here: SciPy's `Rotation` would add 0.2 s to the start
+of every node.
+"""
+
+from dataclasses import dataclass
+from math import asin, atan2, cos, hypot, sin
+
+import cv2
+import numpy as np
+
+_STRAIGHT_UP = 1 - 1e-12
+"""Sine of the pitch from which on yaw and roll are one and the same turn."""
+
+_ROUNDING_RAD = 1e-9
+
+
+@dataclass(frozen=True)
+class Attitude:
+    """How a camera is turned in another frame, rad.
+
+    Yaw turns it to the right, pitch up, roll clockwise as the camera sees it, in the order yaw,
+    pitch, roll.
+    """
+
+    yaw_rad: float = 0.0
+    pitch_rad: float = 0.0
+    roll_rad: float = 0.0
+
+    @classmethod
+    def of(cls, matrix: np.ndarray) -> 'Attitude':
+        """Return the angles of a rotation (3, 3) that takes rays of the camera to that frame."""
+        matrix = np.asarray(matrix, float)
+        up = float(-matrix[1, 2])
+        if abs(up) > _STRAIGHT_UP:
+            return cls(atan2(-matrix[2, 0], matrix[0, 0]), asin(max(-1.0, min(1.0, up))), 0.0)
+        return cls(
+            atan2(matrix[0, 2], matrix[2, 2]),
+            atan2(up, hypot(matrix[0, 2], matrix[2, 2])),
+            atan2(matrix[1, 0], matrix[1, 1]),
+        )
+
+    @property
+    def matrix(self) -> np.ndarray:
+        """Rotation (3, 3) that takes rays of the camera to rays of the frame it is turned in."""
+        (cy, sy), (cp, sp), (cr, sr) = (
+            (cos(angle), sin(angle)) for angle in (self.yaw_rad, self.pitch_rad, self.roll_rad)
+        )
+        yaw = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+        pitch = np.array([[1, 0, 0], [0, cp, -sp], [0, sp, cp]])
+        roll = np.array([[cr, -sr, 0], [sr, cr, 0], [0, 0, 1]])
+        return yaw @ pitch @ roll
+
+    @property
+    def is_pure_yaw(self) -> bool:
+        """Whether the camera is level: turned about the vertical only."""
+        return max(abs(self.pitch_rad), abs(self.roll_rad)) < _ROUNDING_RAD
+
+
+LEVEL = Attitude()
+
+
+def rotation_vector(matrix: np.ndarray) -> np.ndarray:
+    """Return the axis of a rotation (3, 3) times its angle, (3,) rad."""
+    return cv2.Rodrigues(np.asarray(matrix, float))[0].ravel()
+
+
+def rotation_matrix(vector: np.ndarray) -> np.ndarray:
+    """Return the rotation (3, 3) about an axis (3,) whose length is the angle, rad."""
+    return cv2.Rodrigues(np.asarray(vector, float))[0]
+
+
+def angle_between(first: np.ndarray, second: np.ndarray) -> float:
+    """Return the angle of the rotation that takes one attitude (3, 3) to another, rad."""
+    return float(np.linalg.norm(rotation_vector(np.asarray(first).T @ np.asarray(second))))

@@ -1,0 +1,220 @@
+"""Placing: the surface around a rig, and where on it each camera shows anything."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from math import inf, pi
+
+import numpy as np
+
+from fisheye_geometry.errors import GeometryError
+from fisheye_geometry.rig import unwrapped
+from fisheye_geometry.surface import Surface
+from fisheye_geometry.surface_kind import KINDS
+from panorama_stitch.compose.parallel import share
+from panorama_stitch.compose.view import Cut, View, shown
+
+
+@dataclass(eq=False)
+class PlacedView:
+    """A view on the surface of the whole panorama, all rows of it.
+
+    Attributes
+    ----------
+    view
+        What is drawn.
+    index
+        Which camera of the rig it is.
+    axis
+        Column in which the camera looks along its axis.
+    begin, end
+        Columns that may show anything; on a closed surface they may go beyond its edges.
+    valid
+        (rows, end - begin) bool: where it shows anything.
+    body
+        Likewise: where that is the robot itself; None for nowhere.
+    """
+
+    view: View
+    index: int
+    axis: float
+    begin: int
+    end: int
+    valid: np.ndarray = field(init=False)
+    body: np.ndarray | None = field(init=False, default=None)
+
+    def prepare(self, surface: Surface) -> None:
+        """Compute what is drawn where on the surface of the panorama."""
+        width = max(1, self.end - self.begin)
+        self._table = self.view.drawn_on(surface.window(self.begin, 0, width, surface.height))
+        self.valid = self._table.valid
+        if self.view.seen is not None:
+            self.valid = shown(self.view.seen, self._table, self.valid.shape)
+        if self.view.body is not None:
+            self.body = ~shown(~self.view.body, self._table, self.valid.shape) & self.valid
+
+    def cut(self, rows: slice, columns: slice) -> Cut:
+        """Prepare to draw a part, in rows and columns of the whole panorama."""
+        return self._table.part(rows, self._own(columns))
+
+    def shows(self, rows: slice, columns: slice) -> np.ndarray:
+        """(rows, columns) bool: where a part shows anything."""
+        return self.valid[rows, self._own(columns)]
+
+    def shows_body(self, rows: slice, columns: slice) -> np.ndarray:
+        """(rows, columns) bool: where a part shows the robot itself."""
+        if self.body is None:
+            return np.zeros((rows.stop - rows.start, columns.stop - columns.start), bool)
+        return self.body[rows, self._own(columns)]
+
+    def samples(self, surface: Surface, columns: tuple[int, int], step: float):
+        """Prepare to draw every `step`-th row and column of some columns of a surface."""
+        begin, end = columns
+        window = surface.window(begin, 0, max(1, end - begin), surface.height)
+        return self.view.drawn_on(window.with_focal(window.focal_px / step))
+
+    def _own(self, columns: slice) -> slice:
+        return slice(columns.start - self.begin, columns.stop - self.begin)
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """All views of a rig.
+
+    Attributes
+    ----------
+    surface
+        What the whole panorama shows, before it is cropped.
+    views
+        From left to right.
+    wraps
+        Whether its right edge meets its left one.
+    """
+
+    surface: Surface
+    views: tuple[PlacedView, ...]
+    wraps: bool
+
+
+def place(views: Sequence[View], *, wraps: bool = False) -> Placed:
+    """Find the surface on which a rig's panorama lies, and draw nothing yet.
+
+    Parameters
+    ----------
+    views
+        From left to right; the first one decides the kind of surface, its focal length, and of
+        an open panorama where pixels begin.
+    wraps
+        Whether the panorama leads all around: it is 360 degrees wide then, bearing 0 in its
+        middle.
+
+    Raises
+    ------
+    GeometryError
+        If there is no such surface.
+    """
+    grid = _grid(views[0], wraps)
+    axes = _axis_columns(views, grid)
+    placed = [
+        PlacedView(view, index, axis, *_columns(view, grid, axis))
+        for index, (view, axis) in enumerate(zip(views, axes, strict=True))
+    ]
+    if axes[-1] < axes[0]:
+        placed.reverse()
+    rows = np.array([_rows(view, grid) for view in views])
+    top, bottom = int(rows[:, 0].min()), int(rows[:, 1].max())
+    if wraps:
+        left, right = 0, grid.width
+        for each in placed:
+            each.end = min(each.end, each.begin + grid.width)
+        if len(placed) == 1:
+            placed[0].begin, placed[0].end = 0, grid.width
+    else:
+        left, right = min(p.begin for p in placed), max(p.end for p in placed)
+        # No bearing is shown twice: both ends give way alike. Frames side by side are no bearings.
+        is_rig = not any(view.shift_px[0] for view in views)
+        most_px = grid.circumference_px if is_rig else inf
+        excess = right - left - int(min(most_px, right - left))
+        left, right = left + excess // 2, right - (excess - excess // 2)
+        for each in placed:
+            each.begin, each.end = max(each.begin, left) - left, min(each.end, right) - left
+            each.axis -= left
+    surface = grid.window(left, top, right - left, bottom - top)
+    share([partial(each.prepare, surface) for each in placed])
+    return Placed(surface, tuple(placed), wraps)
+
+
+def _grid(first: View, wraps: bool) -> Surface:
+    """Return the surface whose pixels are those of the panorama, counted from somewhere."""
+    surface = first.surface
+    if not wraps:
+        # The first camera's own pixels are kept, so that a level one is only shifted.
+        axis = _axis_column(first, replace(surface, center_x_px=0.0))
+        return replace(surface, center_x_px=surface.center_x_px - axis)
+    if not surface.yaw_is_column_shift:
+        raise GeometryError(
+            f'a {surface.kind} surface cannot lead all around; expected one of '
+            f'{", ".join(name for name, kind in KINDS.items() if kind.yaw_is_column_shift)}'
+        )
+    width = round(surface.circumference_px)
+    return replace(surface, width=width, focal_px=width / (2 * pi), center_x_px=(width - 1) / 2)
+
+
+def _axis_columns(views: Sequence[View], grid: Surface) -> list[float]:
+    """Columns in which the cameras look along their axes, each right of the one before."""
+    if not grid.yaw_is_column_shift:
+        return [_axis_column(view, grid) for view in views]
+    yaws = unwrapped([view.attitude.yaw_rad for view in views])
+    return [
+        grid.center_x_px + yaw * grid.focal_px + view.shift_px[0]
+        for view, yaw in zip(views, yaws, strict=True)
+    ]
+
+
+def _axis_column(view: View, grid: Surface) -> float:
+    """Column in which a camera looks along its axis."""
+    if grid.yaw_is_column_shift:
+        return grid.center_x_px + view.attitude.yaw_rad * grid.focal_px + view.shift_px[0]
+    (x, _), _ = grid.project(view.attitude.matrix[:, 2])
+    return float(x) + view.shift_px[0]
+
+
+def _columns(view: View, grid: Surface, axis: float) -> tuple[int, int]:
+    """Columns in which a camera sees the horizon, as far as that is wanted."""
+    kind, focal_px = KINDS[grid.kind], grid.focal_px
+    left, right, _, _ = view.field_rad()
+    begin = round(axis - kind.column(left) * focal_px + 0.5)
+    end = round(axis + kind.column(right) * focal_px + 0.5)
+    columns = np.arange(begin, end)
+    row = grid.center_y_px + view.shift_px[1]
+    if not _sees(view, grid, np.array([axis]), row)[0]:
+        row += KINDS[grid.kind].row(-view.attitude.pitch_rad) * focal_px
+    sees = _sees(view, grid, columns, row)
+    if not sees.any():
+        return begin, end
+    at = int(np.clip(round(axis) - begin, 0, len(columns) - 1))
+    before, after = np.flatnonzero(~sees[: at + 1]), np.flatnonzero(~sees[at:])
+    first = before[-1] + 1 if len(before) else 0
+    last = at + after[0] if len(after) else len(columns)
+    return begin + int(first), begin + int(max(last, first + 1))
+
+
+def _sees(view: View, grid: Surface, columns: np.ndarray, row: float) -> np.ndarray:
+    """Whether a camera sees anything at pixels of one row."""
+    rays = grid.rays(columns - view.shift_px[0], row - view.shift_px[1])
+    pixels, seen = view.source.project(rays @ view.attitude.matrix)
+    last = np.array([view.source.width, view.source.height]) - 0.5
+    return seen & np.all((pixels >= -0.5) & (pixels <= last), axis=-1)
+
+
+def _rows(view: View, grid: Surface) -> tuple[int, int]:
+    """Rows that a camera shows straight ahead, as far as the surface goes up and down."""
+    kind = KINDS[grid.kind]
+    _, _, up, down = view.field_rad()
+    pitch, steepest = view.attitude.pitch_rad, max(kind.steepest_rad, *view.own_field_rad()[2:])
+    top, bottom = (
+        grid.center_y_px + kind.row(float(np.clip(angle, -steepest, steepest))) * grid.focal_px
+        for angle in (-up - pitch, down - pitch)
+    )
+    shift = view.shift_px[1]
+    return round(top + shift + 0.5), round(bottom + shift + 0.5)
