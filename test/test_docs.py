@@ -29,6 +29,6 @@ def test_every_node_has_a_page_with_its_parameters():
         'fisheye_undistort.settings.UndistortSettings',
         'panorama_stitch.settings.StitchSettings',
         'panorama_stitch.settings.PanoramaSettings',
-        'panorama_stitch.viewer_settings.ViewerSettings',
+        'panorama_viewer.settings.ViewerSettings',
     ):
         assert f'<!-- parameters: {settings} -->' in described

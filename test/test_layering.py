@@ -13,6 +13,7 @@ OURS = (
     'fisheye_capture',
     'fisheye_undistort',
     'panorama_stitch',
+    'panorama_viewer',
 )
 BELOW = {
     'fisheye_geometry': set(),
@@ -25,6 +26,7 @@ BELOW = {
         'fisheye_capture',
         'fisheye_undistort',
     },
+    'panorama_viewer': {'fisheye_geometry', 'fisheye_bridge'},
 }
 ROS = {
     'rclpy',

@@ -10,7 +10,7 @@ import pytest
 from ament_index_python.packages import get_package_prefix
 from rig import camera_parameters, wait_for
 
-COMMAND = Path(get_package_prefix('panorama_stitch')) / 'lib' / 'panorama_stitch' / 'snapshot'
+COMMAND = Path(get_package_prefix('panorama_viewer')) / 'lib' / 'panorama_viewer' / 'snapshot'
 START_S = 40.0
 
 

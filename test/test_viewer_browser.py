@@ -19,12 +19,12 @@ from selenium.webdriver import ActionChains, Keys
 
 from fisheye_bridge.projection import surface_of
 from fisheye_geometry.surface import Surface
-from panorama_stitch.viewer_projection import described
-from panorama_stitch.viewer_server import ViewerServer
-from panorama_stitch.viewer_settings import ViewerSettings
+from panorama_viewer.projection import described
+from panorama_viewer.server import ViewerServer
+from panorama_viewer.settings import ViewerSettings
 
 DEADLINE_S = 60.0
-ATTACK = Path(__file__).parents[1] / 'src/panorama_stitch/test/attack.py'
+ATTACK = Path(__file__).parents[1] / 'src/panorama_viewer/test/attack.py'
 CLOSE_DEG = 1.0
 STRAIGHT_PX = 2.0
 """A line two pixels of the panorama wide, enlarged."""

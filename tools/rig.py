@@ -20,7 +20,7 @@ EXECUTABLES = {
     'undistort': 'fisheye_undistort',
     'stitch': 'panorama_stitch',
     'panorama': 'panorama_stitch',
-    'viewer': 'panorama_stitch',
+    'viewer': 'panorama_viewer',
 }
 SIDES = ('left', 'right')
 SEPARATE = ('left/capture', 'right/capture', 'left/undistort', 'right/undistort', 'stitch')

@@ -8,7 +8,6 @@ setup(
     name=package_name,
     version='0.1.0',
     packages=[package_name, f'{package_name}.compose'],
-    package_data={package_name: ['web/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),
@@ -24,9 +23,7 @@ setup(
     entry_points={
         'console_scripts': [
             'panorama_node = panorama_stitch.panorama_node:main',
-            'snapshot = panorama_stitch.snapshot_node:main',
             'stitch_node = panorama_stitch.stitch_node:main',
-            'viewer_node = panorama_stitch.viewer_node:main',
         ],
     },
 )

@@ -81,7 +81,7 @@ def nodes(arguments):
     if base or not robot:
         started += (composed if arguments['composed'] else separate)(arguments)
         if arguments['view']:
-            started.append(node(arguments, 'panorama_stitch', 'viewer', host=arguments['host']))
+            started.append(node(arguments, 'panorama_viewer', 'viewer', host=arguments['host']))
         if arguments['transforms']:
             started += transforms(arguments)
     return started

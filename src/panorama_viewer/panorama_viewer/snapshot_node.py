@@ -16,7 +16,7 @@ from fisheye_bridge.stamps import ns_of
 from fisheye_bridge.topics import ImageSubscription
 from fisheye_geometry.encodings import to_opencv
 from fisheye_geometry.errors import FisheyeError, SettingError, SourceError
-from panorama_stitch.snapshot import FORMATS, save
+from panorama_viewer.snapshot import FORMATS, save
 
 
 class SnapshotNode(Node):

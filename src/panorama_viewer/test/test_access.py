@@ -14,8 +14,8 @@ import pytest
 from serving import DEADLINE_S, address, here, picture, request, state, visit
 
 from fisheye_geometry.errors import SettingError
-from panorama_stitch import viewer_browser, viewer_connection
-from panorama_stitch.viewer_token import kept_token
+from panorama_viewer import browser, connection
+from panorama_viewer.token import kept_token
 
 REFUSED, LATER = 1008, 1013
 
@@ -111,15 +111,15 @@ def test_who_has_the_token_gets_the_place_of_one_who_has_not(serve):
 
 @pytest.mark.parametrize('said', [b'', b'GET / HTTP/1.1\r\nHost: localhost\r\n'])
 def test_a_connection_without_a_request_ends(serve, monkeypatch, said):
-    monkeypatch.setattr(viewer_connection, 'ANSWERED_WITHIN_S', 0.2)
+    monkeypatch.setattr(connection, 'ANSWERED_WITHIN_S', 0.2)
     port = int(re.search(r':(\d+)/', serve().url)[1])
-    with socket.create_connection(('127.0.0.1', port), timeout=DEADLINE_S) as connection:
-        connection.sendall(said)
-        assert connection.recv(1) == b''
+    with socket.create_connection(('127.0.0.1', port), timeout=DEADLINE_S) as client:
+        client.sendall(said)
+        assert client.recv(1) == b''
 
 
 def test_a_page_that_draws_nothing_leaves_its_place(serve, monkeypatch):
-    monkeypatch.setattr(viewer_browser, 'SILENT_S', 0.2)
+    monkeypatch.setattr(browser, 'SILENT_S', 0.2)
     server = serve()
 
     async def scenario(session):
@@ -178,7 +178,7 @@ def test_a_bug_takes_only_its_part_down_and_is_told_once(serve):
     visit(scenario)
     calibration, feeding = server.faults
     assert 'KeyError' in calibration
-    assert 'test_viewer_access.py' in calibration
+    assert 'test_access.py' in calibration
     assert 'JSON' in feeding
     server.faults.clear()
 
@@ -228,7 +228,7 @@ def test_a_token_file_that_is_no_file_is_refused(tmp_path):
 def run_node(folder, seconds_to_address, has_terminal):
     """Run the node until it has told its address; give terminal, output and log files."""
     leader, follower = pty.openpty()
-    code = 'from panorama_stitch.viewer_node import main; main()'
+    code = 'from panorama_viewer.viewer_node import main; main()'
     if has_terminal:
         take = f'import fcntl, termios; fcntl.ioctl({follower}, termios.TIOCSCTTY, 0); '
         code = take + code

@@ -13,11 +13,11 @@ from typing import Any
 from aiohttp import web
 
 from fisheye_geometry.errors import SettingError
-from panorama_stitch.viewer_address import reachable, refusal
-from panorama_stitch.viewer_faults import Faults
-from panorama_stitch.viewer_gate import Gate
-from panorama_stitch.viewer_settings import ViewerSettings
-from panorama_stitch.viewer_site import Site
+from panorama_viewer.address import reachable, refusal
+from panorama_viewer.faults import Faults
+from panorama_viewer.gate import Gate
+from panorama_viewer.settings import ViewerSettings
+from panorama_viewer.site import Site
 
 _SHUTDOWN_S = 1.0
 """What a request that is not answered may hold up the end."""

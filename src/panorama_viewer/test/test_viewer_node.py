@@ -24,7 +24,7 @@ from sensor_msgs.msg import CompressedImage
 from fisheye_bridge.qos import IMAGE, LATCHED
 from fisheye_bridge.stamps import stamp_of
 from fisheye_geometry.errors import SettingError
-from panorama_stitch.viewer_node import ViewerNode
+from panorama_viewer.viewer_node import ViewerNode
 
 DEADLINE_S = 15.0
 JPEG = b'\xff\xd8 as it is \xff\xd9'

@@ -1,8 +1,8 @@
 import pytest
 from serving import answered
 
-from panorama_stitch.viewer_server import ViewerServer
-from panorama_stitch.viewer_settings import ViewerSettings
+from panorama_viewer.server import ViewerServer
+from panorama_viewer.settings import ViewerSettings
 
 
 @pytest.fixture

@@ -14,9 +14,9 @@ from ipaddress import ip_address, ip_network
 
 from aiohttp import web
 
-from panorama_stitch.viewer_allowance import Allowance
-from panorama_stitch.viewer_connection import Connection
-from panorama_stitch.viewer_faults import Faults
+from panorama_viewer.allowance import Allowance
+from panorama_viewer.connection import Connection
+from panorama_viewer.faults import Faults
 
 MAX_STRANGERS = 128
 _BACKLOG = 128

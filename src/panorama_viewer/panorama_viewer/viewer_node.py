@@ -19,11 +19,11 @@ from fisheye_bridge.qos import IMAGE_INPUT, LATCHED
 from fisheye_bridge.running import run
 from fisheye_bridge.stamps import ns_of
 from fisheye_geometry.errors import FisheyeError, OverlapError
-from panorama_stitch.viewer_projection import described
-from panorama_stitch.viewer_server import ViewerServer
-from panorama_stitch.viewer_settings import ViewerSettings
-from panorama_stitch.viewer_status import ViewerStatus, measured
-from panorama_stitch.viewer_token import print_on_terminal
+from panorama_viewer.projection import described
+from panorama_viewer.server import ViewerServer
+from panorama_viewer.settings import ViewerSettings
+from panorama_viewer.status import ViewerStatus, measured
+from panorama_viewer.token import print_on_terminal
 
 _TELL_S = 0.5
 

@@ -11,8 +11,8 @@ import sys
 import threading
 from contextlib import suppress
 
-from panorama_stitch.viewer_server import ViewerServer
-from panorama_stitch.viewer_settings import ViewerSettings
+from panorama_viewer.server import ViewerServer
+from panorama_viewer.settings import ViewerSettings
 
 RATE_HZ = 30.0
 PICTURE = os.urandom(100_000)

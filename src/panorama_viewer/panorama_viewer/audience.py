@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 
-from panorama_stitch.viewer_browser import Browser
+from panorama_viewer.browser import Browser
 
 
 class Audience:

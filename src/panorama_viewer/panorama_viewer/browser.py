@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
-from panorama_stitch.viewer_connection import Connection
+from panorama_viewer.connection import Connection
 
 DRAWN = 'drawn'
 """What a browser says when it has drawn a picture: nothing else is expected from it."""

@@ -17,7 +17,7 @@ _TYPES = {
 
 def pages() -> dict[str, Handler]:
     """Return what answers each path of the page."""
-    web_files = files('panorama_stitch') / 'web'
+    web_files = files('panorama_viewer') / 'web'
     answers = {
         f'/{path.name}': _page(path.name, path.read_bytes()) for path in web_files.iterdir()
     }

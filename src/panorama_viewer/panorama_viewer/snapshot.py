@@ -16,7 +16,7 @@ import numpy as np
 from fisheye_geometry.errors import SettingError
 from fisheye_geometry.remap import RemapTable
 from fisheye_geometry.surface import Surface
-from panorama_stitch.viewer_projection import described
+from panorama_viewer.projection import described
 
 FORMATS = {'png': '.png', 'gpano': '.jpg'}
 """How a panorama can be saved, and the suffix of the file."""

@@ -9,14 +9,14 @@ from typing import Any
 from aiohttp import WSCloseCode, web
 
 from fisheye_geometry.errors import FisheyeError
-from panorama_stitch.viewer_address import is_loopback
-from panorama_stitch.viewer_audience import Audience
-from panorama_stitch.viewer_browser import Browser, Picture, dismiss
-from panorama_stitch.viewer_gate import Gate
-from panorama_stitch.viewer_guard import HEADERS, SUBPROTOCOL, Guard
-from panorama_stitch.viewer_pages import pages
-from panorama_stitch.viewer_settings import ViewerSettings
-from panorama_stitch.viewer_token import kept_token, new_token
+from panorama_viewer.address import is_loopback
+from panorama_viewer.audience import Audience
+from panorama_viewer.browser import Browser, Picture, dismiss
+from panorama_viewer.gate import Gate
+from panorama_viewer.guard import HEADERS, SUBPROTOCOL, Guard
+from panorama_viewer.pages import pages
+from panorama_viewer.settings import ViewerSettings
+from panorama_viewer.token import kept_token, new_token
 
 _CLOSE_S = 1.0
 """What a browser that does not answer may hold up the end."""

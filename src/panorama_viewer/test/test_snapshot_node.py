@@ -16,7 +16,7 @@ from fisheye_bridge.projection import projection_of
 from fisheye_bridge.qos import IMAGE, LATCHED
 from fisheye_bridge.stamps import stamp_of
 from fisheye_geometry.surface import Surface
-from panorama_stitch.snapshot_node import SnapshotNode, main, parse
+from panorama_viewer.snapshot_node import SnapshotNode, main, parse
 
 SURFACE = Surface('cylindrical', 32, 12, 10.0, 15.5, 5.5)
 PANORAMA = np.full((12, 32, 3), (10, 20, 30), np.uint8)

@@ -8,12 +8,12 @@ import aiohttp
 import pytest
 from serving import DEADLINE_S, address, answered, picture, request, state, visit
 
-import panorama_stitch
+import panorama_viewer
 from fisheye_geometry.errors import OverlapError, SettingError
-from panorama_stitch.viewer_server import ViewerServer
-from panorama_stitch.viewer_settings import ViewerSettings
+from panorama_viewer.server import ViewerServer
+from panorama_viewer.settings import ViewerSettings
 
-WEB = Path(panorama_stitch.__file__).parent / 'web'
+WEB = Path(panorama_viewer.__file__).parent / 'web'
 
 
 def wait_for(condition):

@@ -1,6 +1,6 @@
 import pytest
 
-from panorama_stitch.viewer_status import ViewerStatus, measured, plain
+from panorama_viewer.status import ViewerStatus, measured, plain
 
 
 def texts(told):

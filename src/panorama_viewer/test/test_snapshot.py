@@ -10,7 +10,7 @@ from fisheye_msgs.msg import Projection
 from fisheye_bridge.projection import surface_of
 from fisheye_geometry.errors import SettingError
 from fisheye_geometry.surface import Surface
-from panorama_stitch.snapshot import gpano, on_sphere, save
+from panorama_viewer.snapshot import gpano, on_sphere, save
 
 SURFACES = [
     Surface('cylindrical', 1200, 480, 215.0, 590.0, 250.0),

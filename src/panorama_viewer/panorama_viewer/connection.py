@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from typing import Protocol
 
-from panorama_stitch.viewer_allowance import Allowance
+from panorama_viewer.allowance import Allowance
 
 ANSWERED_WITHIN_S = 10.0
 """From the connection to the end of the answer; pages are small."""
