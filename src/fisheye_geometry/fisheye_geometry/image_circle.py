@@ -1,5 +1,6 @@
 """The image circle: how far a fisheye lens really lights the sensor, seen in its pictures."""
 
+import cv2
 import numpy as np
 
 from fisheye_geometry.lens import Lens
@@ -15,6 +16,8 @@ _CUT = 0.02
 """Share of a picture: more of it than that is lit where the lens maps nothing."""
 _COLUMNS = 640
 """Columns that are enough to measure the circle."""
+_GRID = 48
+"""Points to a side at which a lens is asked; between them angles are interpolated."""
 
 
 class ImageCircle:
@@ -34,10 +37,8 @@ class ImageCircle:
     def __init__(self, lens: Lens):
         self._lens = lens
         self._step = max(1, lens.width // _COLUMNS)
-        y, x = np.ogrid[0 : lens.height : self._step, 0 : lens.width : self._step]
-        rays, seen = lens.unproject(np.stack(np.broadcast_arrays(x, y), axis=-1))
-        angle = np.arccos(rays[..., 2].clip(-1, 1))
-        self._ring = np.where(seen, angle // _RING_RAD, 0).astype(np.intp).ravel()
+        angle = _angles(lens, self._step)
+        self._ring = np.where(angle >= 0, angle // _RING_RAD, 0).astype(np.intp).ravel()
         self._pixels = np.bincount(self._ring)
         self._unseen = ~seen.ravel()
         self._found = False
@@ -66,6 +67,16 @@ class ImageCircle:
         self._found = self._found or bool(is_circle)
         self.angle_rad = float(min(angle, self._lens.max_angle_rad))
         return True
+
+
+def _angles(lens: Lens, step: int) -> np.ndarray:
+    """Angle from the axis of every `step`-th row and column, rad; NaN where nothing is seen."""
+    y, x = (np.arange(0, side, step, dtype=np.float32) for side in (lens.height, lens.width))
+    grid_y, grid_x = (np.linspace(0, s[-1], min(len(s), _GRID), dtype=float) for s in (y, x))
+    rays, seen = lens.unproject(np.stack(np.meshgrid(grid_x, grid_y), axis=-1))
+    angles = np.where(seen, np.arccos(rays[..., 2].clip(-1, 1)), np.nan).astype(np.float32)
+    at = (s / max(s[-1], 1) * (min(len(s), _GRID) - 1) for s in (x, y))
+    return cv2.remap(angles, *np.meshgrid(*at), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
 
 
 class SeenLens:

@@ -7,6 +7,11 @@ import numpy as np
 
 from fisheye_geometry.lens_model import Lens
 
+_ITERATIONS = 20
+"""Of Newton's method; what it has not found by then is no ray of a real lens."""
+_CLOSE = 1e-9
+"""Normalized picture coordinates that are the same."""
+
 
 class PinholeLens(Lens):
     """Conventional lens with the distortion of Brown and Conrady (`plumb_bob` and rational).
@@ -61,19 +66,27 @@ class PinholeLens(Lens):
         shape = normalized.shape[:-1]
         target = normalized.reshape(-1, 2)
         plane = self._start(target)
-        for _ in range(20):
-            value = self._on_plane(plane)
-            step = 1e-6
-            dx = (self._on_plane(plane + np.array([step, 0.0])) - value) / step
-            dy = (self._on_plane(plane + np.array([0.0, step])) - value) / step
-            jacobian = np.stack([dx, dy], axis=-1)
-            determinant = np.linalg.det(jacobian)
-            jacobian[np.abs(determinant) < 1e-9] = np.eye(2)
-            miss = (target - value)[..., None]
-            plane = plane + np.linalg.solve(jacobian, miss)[..., 0].clip(-0.5, 0.5)
+        left = np.arange(len(plane))
+        for _ in range(_ITERATIONS):
+            now, step = plane[left], 1e-6
+            value = self._on_plane(now)
+            miss = target[left] - value
+            is_off = np.hypot(*miss.T) > _CLOSE / 10
+            left, now, value, miss = left[is_off], now[is_off], value[is_off], miss[is_off]
+            if not len(left):
+                break
+            a, c = ((self._on_plane(now + np.array([step, 0.0])) - value) / step).T
+            b, d = ((self._on_plane(now + np.array([0.0, step])) - value) / step).T
+            determinant = a * d - b * c
+            flat = np.abs(determinant) < 1e-9
+            a, b, c, d, determinant = np.where(
+                flat, [[1.0], [0.0], [0.0], [1.0], [1.0]], [a, b, c, d, determinant]
+            )
+            move = np.stack([d * miss[:, 0] - b * miss[:, 1], a * miss[:, 1] - c * miss[:, 0]])
+            plane[left] = now + (move / determinant).T.clip(-0.5, 0.5)
         rays = np.concatenate([plane, np.ones((len(plane), 1))], axis=-1)
         angle = np.arctan(np.hypot(*plane.T))
-        seen = np.hypot(*(self._on_plane(plane) - target).T) < 1e-9
+        seen = np.hypot(*(self._on_plane(plane) - target).T) < _CLOSE
         seen &= angle <= self.max_angle_rad * (1 + 1e-12)
         rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
         return rays.reshape(*shape, 3), seen.reshape(shape)
