@@ -1,6 +1,7 @@
 """A camera's topics: its pictures, and the lens that took them as far as it can be trusted."""
 
 from collections.abc import Callable
+from time import monotonic
 
 import numpy as np
 from rclpy.node import Node
@@ -15,6 +16,10 @@ from fisheye_geometry.camera import Readout
 from fisheye_geometry.errors import CalibrationError, FisheyeError
 from fisheye_geometry.image_circle import SeenLens
 from fisheye_geometry.lens import Lens
+from fisheye_geometry.settling import Settling
+
+_AGAIN_S = 1.0
+"""Until a calibration that was refused is looked at again: settings may have changed."""
 
 
 class CameraSubscription:
@@ -64,6 +69,8 @@ class CameraSubscription:
         self._content, self._header = '', Header()
         self._picture_size: tuple[int, int] | None = None
         self._refusal, self._is_over, self._note = '', False, ''
+        self._refused, self._again_s = '', 0.0
+        self._settling = Settling()
         self.pictures = ImageSubscription(
             node,
             f'{self._prefix}image_raw',
@@ -107,6 +114,12 @@ class CameraSubscription:
             report.add(ERROR, f'waiting for {what}')
         if self._is_over:
             self._refusal = ''
+        if self._settling.waits:
+            report.add(
+                WARN,
+                f'{self._prefix}camera_info changes again and again; expected one calibration: '
+                f'it is followed every {self._settling.pause_s:.0f} s',
+            )
         if self._note:
             report.add(WARN, self._note)
         self.pictures.dropped.tell(report)
@@ -117,8 +130,11 @@ class CameraSubscription:
         content = repr((*size, readout, message.distortion_model, *message.k, *message.d))
         if content == self._content:
             self._is_over = True
+            self._settling.calm()
             if self._picture_size is None:
                 self._tell()
+            return
+        if content == self._refused and monotonic() < self._again_s:
             return
         try:
             lens = camera_of(message).lens
@@ -130,8 +146,11 @@ class CameraSubscription:
                         lens.width, lens.height, part, *self._picture_size
                     )
                 )
+            if content != self._refused and not self._settling.follow():
+                return
             self._check(lens)
         except FisheyeError as error:
+            self._refused, self._again_s = content, monotonic() + _AGAIN_S
             self.refuse(error)
             return
         self._content, self._header, self._note = content, message.header, ''

@@ -40,7 +40,7 @@ class ImageCircle:
         angle = _angles(lens, self._step)
         self._ring = np.where(angle >= 0, angle // _RING_RAD, 0).astype(np.intp).ravel()
         self._pixels = np.bincount(self._ring)
-        self._unseen = ~seen.ravel()
+        self._unseen = np.isnan(angle).ravel()
         self._found = False
         self.is_cut = False
         self.angle_rad = lens.max_angle_rad
@@ -73,10 +73,21 @@ def _angles(lens: Lens, step: int) -> np.ndarray:
     """Angle from the axis of every `step`-th row and column, rad; NaN where nothing is seen."""
     y, x = (np.arange(0, side, step, dtype=np.float32) for side in (lens.height, lens.width))
     grid_y, grid_x = (np.linspace(0, s[-1], min(len(s), _GRID), dtype=float) for s in (y, x))
-    rays, seen = lens.unproject(np.stack(np.meshgrid(grid_x, grid_y), axis=-1))
-    angles = np.where(seen, np.arccos(rays[..., 2].clip(-1, 1)), np.nan).astype(np.float32)
-    at = (s / max(s[-1], 1) * (min(len(s), _GRID) - 1) for s in (x, y))
-    return cv2.remap(angles, *np.meshgrid(*at), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    coarse = _angles_at(lens, np.stack(np.meshgrid(grid_x, grid_y), axis=-1))
+    at = np.meshgrid(*(s / max(s[-1], 1) * (min(len(s), _GRID) - 1) for s in (x, y)))
+    angles = cv2.remap(coarse, *at, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    # Where the lens ends between the points, each pixel is asked for.
+    known = np.isfinite(coarse).astype(np.float32)
+    share = cv2.remap(known, *at, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    row, column = np.nonzero(np.isnan(angles) & (share > 0))
+    angles[row, column] = _angles_at(lens, np.stack([x[column], y[row]], axis=-1))
+    return angles
+
+
+def _angles_at(lens: Lens, pixels: np.ndarray) -> np.ndarray:
+    """Angle from the axis at pixels (..., 2), rad; NaN where nothing is seen."""
+    rays, seen = lens.unproject(pixels)
+    return np.where(seen, np.arccos(rays[..., 2].clip(-1, 1)), np.nan).astype(np.float32)
 
 
 class SeenLens:

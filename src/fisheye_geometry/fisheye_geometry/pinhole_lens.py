@@ -56,6 +56,8 @@ class PinholeLens(Lens):
 
     def _distort(self, rays):
         rays = np.asarray(rays, float)
+        if not rays.size:
+            return rays[..., :2]
         none = np.zeros(3)
         pixels, _ = cv2.projectPoints(
             rays.reshape(-1, 1, 3), none, none, np.eye(3), np.array(self.distortion)

@@ -168,8 +168,11 @@ class LiveStitcher:
         """Say what a camera's pictures show; parameters and errors as `Stitcher.place`."""
         with self._lock:
             if self.stitcher.place(camera, source, surface, interpolation):
-                self.pairing.clear()
-                self._last[camera] = _Last(None, self._last[camera].arrived_s)
+                last = self._last[camera]
+                size = source.height, source.width
+                if last.image is not None and last.image.shape[:2] != size:
+                    self.pairing.clear()
+                    self._last[camera] = _Last(None, last.arrived_s)
                 self._preparation.renew(forget=True)
 
     def apply(self, settings: PanoramaOutputSettings) -> None:

@@ -8,6 +8,7 @@ from fisheye_bridge.running import run
 from fisheye_bridge.stamps import ns_of
 from fisheye_bridge.topics import ImageSubscription
 from fisheye_geometry.errors import FisheyeError
+from fisheye_geometry.settling import Settling
 from fisheye_geometry.surface import Surface
 from panorama_stitch.base_node import PanoramaBase
 from panorama_stitch.settings import StitchSettings
@@ -33,6 +34,7 @@ class _Eye:
         self.name = name
         self._node = node
         self._is_placed, self._announced = False, None
+        self._settling = Settling()
         node.create_subscription(Projection, f'{name}/projection', self._take_projection, LATCHED)
         self.pictures = ImageSubscription(
             node, f'{name}/image_rect', self._take_image, key=f'{name} refused'
@@ -52,7 +54,8 @@ class _Eye:
 
     def _take_image(self, image, encoding, header) -> None:
         surface = self._announced
-        if surface and image.shape[:2] == (surface.height, surface.width):
+        fits = surface and image.shape[:2] == (surface.height, surface.width)
+        if fits and self._settling.follow():
             self._place(surface)
         self._node.take(self.name, ns_of(header.stamp), image, encoding)
 

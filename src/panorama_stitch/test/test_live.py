@@ -294,3 +294,14 @@ def test_cameras_of_different_clocks_are_paired_by_arrival(make_line, pictures):
     assert line.published[-1][0] <= line.stamp_ns - 37 * 10**9, 'the older stamp'
     line.live.apply(SETTINGS)
     line.feed(pictures, lambda: line.published[-1][0] > 0, 'pairs by stamp again')
+
+
+def test_a_lens_that_changes_with_each_frame_stops_no_panorama(make_line, pictures):
+    line = make_line()
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    count = len(line.published)
+    for index in range(1, 21):
+        lens = replace(LENS, focal_x_px=LENS.focal_x_px + 0.01 * index)
+        line.live.place('left', lens, SETTINGS.surface_of(lens))
+        line.feed(pictures, lambda seen=count + index: len(line.published) >= seen, 'the next one')
+    assert line.live.unpaired_s < SETTINGS.stale_after_s
