@@ -9,11 +9,12 @@ from contextlib import suppress
 from math import cos, degrees, isfinite, radians, sin
 from pathlib import Path
 
-import yaml
 from ament_index_python.packages import get_package_share_directory
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironmentVariable
 from launch_ros.actions import Node, SetParameter
 
+from fisheye_geometry.errors import CameraFileError
+from fisheye_geometry.yaml_file import read_mapping
 from launch import LaunchDescription, logging
 
 CONFIG = Path(get_package_share_directory('panorama_stitch')) / 'config'
@@ -182,12 +183,15 @@ def angle_between_cameras_deg(given, path):
 def measured_yaw_deg(path):
     """Give the angle between the two axes that was measured and saved, deg."""
     try:
-        saved = yaml.safe_load(Path(path).read_text())
+        saved = read_mapping(path)
         (left, right), (overlap,) = saved['cameras'], saved['overlaps']
         is_angle = overlap['found'] and left['surface'] != 'rectilinear'
         apart_px = overlap['offset_x_px'] + right['center_x_px'] - left['center_x_px']
         yaw_deg = degrees(apart_px / left['focal_px'])
-    except (KeyError, TypeError, ValueError, ArithmeticError, yaml.YAMLError) as error:
+    except CameraFileError as error:
+        reason = str(error).removeprefix(f'{path}: ')
+        raise RuntimeError(f'{path} is not the overlap file of two cameras: {reason}') from error
+    except (KeyError, TypeError, ValueError, ArithmeticError) as error:
         raise RuntimeError(f'{path} is not the overlap file of two cameras') from error
     if not is_angle:
         raise RuntimeError(f'{path} holds no angle between the cameras; give yaw_deg')

@@ -170,7 +170,9 @@ def test_transforms_wait_for_a_file_that_is_not_there_yet(rig, tmp_path):
     assert 'later.yaml is not there yet' in warning
 
 
-@pytest.mark.parametrize('content', ['', 'image_width: 640', 'cameras: [a]\noverlaps: 3', '{['])
+@pytest.mark.parametrize(
+    'content', ['', 'image_width: 640', 'cameras: [a]\noverlaps: 3', '{[', 'a: !!bool b']
+)
 def test_a_foreign_file_is_a_sentence(rig, overlap_file, content):
     overlap_file.write_text(content)
     with pytest.raises(RuntimeError, match='is not the overlap file of two cameras'):
