@@ -46,6 +46,7 @@ SCALARS = [
         '2001-99-99',
     ),
     *('!!python/object/apply:os.system ["true"]', '!!binary x', '[1, [2]]', '{a: b}', '*b11'),
+    *('!!bool maybe', '!!int ""', '!!timestamp x', '"\\UFFFFFFFF"', '[' * 20_000),
     *('&a *a', '"', '\t', '%YAML 9.9', '? - :', '\x00', 'é', '190:20:30', '<<', '"\\uD800"'),
 ]
 

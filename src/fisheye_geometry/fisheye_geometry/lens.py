@@ -40,7 +40,7 @@ def make_lens(model: str, width: int, height: int, matrix, distortion) -> Lens:
     """
     if model not in _MODELS:
         raise CalibrationError(
-            f"distortion model '{model}' is not known; expected one of {', '.join(_MODELS)}"
+            f'distortion model {model!r:.60} is not known; expected one of {", ".join(_MODELS)}'
         )
     lens = _MODELS[model]
     most = max(lens.coefficient_counts)

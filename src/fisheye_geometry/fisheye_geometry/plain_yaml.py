@@ -66,7 +66,7 @@ def parse_mapping(text: str) -> Mapping:
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         line = f' at line {mark.line + 1}' if mark else ''
-        raise CameraFileError(f'not valid YAML{line}: {error.problem}') from error
+        raise CameraFileError(f'not valid YAML{line}: {error.problem:.200}') from error
     except (yaml.YAMLError, ValueError, OverflowError) as error:  # of characters that are none
         reason = str(error).splitlines()[0]
         raise CameraFileError(f'not valid YAML: {reason}') from error
@@ -176,7 +176,7 @@ class _Builder:
 def _refuse_tag(event) -> None:
     if event.tag not in (None, _IGNORED_TAG):
         tag, line = event.tag.replace('tag:yaml.org,2002:', '!!'), event.start_mark.line + 1
-        raise CameraFileError(f'line {line}: it has the tag `{tag:.40}`; expected plain values')
+        raise CameraFileError(f'line {line}: it has the tag {tag!r:.60}; expected plain values')
 
 
 def _scalar(text: str):

@@ -159,6 +159,7 @@ def test_the_field_of_view_across_the_picture():
     ('change', 'words'),
     [
         ({'model': 'omnidirectional'}, 'omnidirectional.*expected one of equidistant'),
+        ({'model': 'x\n' * 500}, r'^distortion model [^\n]{60} is not known'),
         ({'width': 0}, 'width is 0 px; expected 1 to'),
         ({'matrix': [0, 0, 1, 0, 1, 1, 0, 0, 1]}, 'focal_x_px is 0.0; expected'),
         ({'matrix': [1, 0, 1, 0, float('nan'), 1, 0, 0, 1]}, 'focal_y_px is nan; expected'),
