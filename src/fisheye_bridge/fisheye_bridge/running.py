@@ -33,6 +33,9 @@ _LONGEST_END_S = 1.2
 _TRIES = 3
 """So often at most a node that hears nobody connects anew."""
 
+_BOUND = 'FISHEYE_ENDS_WITH_PARENT'
+"""Set where whoever started this process may end without telling it, as launch does at SIGTERM."""
+
 
 def run(node_class: type[Node]) -> int:
     """Run a node until SIGINT or SIGTERM.
@@ -62,6 +65,7 @@ class _Process:
         self._node: Node | None = None
         self._parameters: list[Parameter] = []
         self._tries = 0
+        self._parent = os.getppid() if os.environ.get(_BOUND) == '1' else None
         self._ended = threading.Event()
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._end)
@@ -93,6 +97,9 @@ class _Process:
             refresh, hearing = refresher(node), Hearing(node)
             while not self._ended.is_set():
                 executor.spin_once(timeout_sec=_LONGEST_WAIT_S)
+                if self._parent not in (None, os.getppid()):
+                    node.get_logger().info('ending, as the process that started this node did')
+                    self._end()
                 reason = links.changed(refresh)
                 if not reason and self._tries < _TRIES and (reason := hearing.silence()):
                     self._tries += 1

@@ -9,7 +9,16 @@ from contextlib import suppress
 from math import cos, degrees, isfinite, radians, sin
 from pathlib import Path
 
+<<<<<<< HEAD
 from ament_index_python.packages import get_package_share_directory
+=======
+import yaml
+from ament_index_python.packages import (
+    PackageNotFoundError,
+    get_package_prefix,
+    get_package_share_directory,
+)
+>>>>>>> fa1e1df (Start nodes again, end them with their launch, and hand numbers on)
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironmentVariable
 from launch_ros.actions import Node, SetParameter
 
@@ -42,6 +51,10 @@ FLAGS = tuple(name for name, (value, _) in ARGUMENTS.items() if value == 'false'
 OF_LAUNCH = ('launch-prefix', 'launch-prefix-filter', 'emulate_tty', 'ros_namespace')
 """What launch itself and launch_ros take beside a file's own arguments."""
 PROFILES = 'FASTRTPS_DEFAULT_PROFILES_FILE'
+BOUND = 'FISHEYE_ENDS_WITH_PARENT'
+"""launch that gets SIGTERM ends without a word to its nodes: they notice that it has gone."""
+RESPAWN_DELAY_S = 2.0
+YES, NO = ('true', '1', 'yes', 'on'), ('false', '0', 'no', 'off')
 
 
 def start(context):
@@ -62,15 +75,38 @@ def check_names(words):
 
 def checked(arguments):
     """Give the arguments, those that are true or false as bool."""
-    flags = {}
-    for name in FLAGS:
-        flags[name] = {'true': True, 'false': False}.get(arguments[name].lower())
-        if flags[name] is None:
-            raise RuntimeError(f"{name} is '{arguments[name]}'; expected true or false")
+    flags = {name: flag(name, arguments[name]) for name in FLAGS}
     paths = {name: os.path.expanduser(arguments[name]) for name in ('params_file', 'overlap_file')}
     if not Path(paths['params_file']).is_file():
         raise RuntimeError(f"params_file is '{paths['params_file']}', which is no file")
-    return {**arguments, **flags, **paths}
+    rate = arguments['frame_rate_hz']
+    rates = {'frame_rate_hz': number('frame_rate_hz', rate)} if rate else {}
+    return {**arguments, **flags, **paths, **rates}
+
+
+def flag(name, text):
+    """Read an argument that is true or false."""
+    if text.lower() not in (*YES, *NO):
+        raise RuntimeError(f"{name} is '{text}'; expected true or false")
+    return text.lower() in YES
+
+
+def number(name, text):
+    """Read an argument that is a number; launch_ros would hand text on as text."""
+    with suppress(ValueError):
+        if isfinite(value := float(text)):
+            return value
+    raise RuntimeError(f"{name} is '{text}'; expected a number")
+
+
+def check_tf2():
+    """Refuse to start anything if what publishes the transforms is not there."""
+    try:
+        get_package_prefix('tf2_ros')
+    except PackageNotFoundError as error:
+        raise RuntimeError(
+            'transforms:=true needs the package tf2_ros (sudo apt install ros-jazzy-tf2-ros)'
+        ) from error
 
 
 def nodes(arguments):
@@ -90,7 +126,7 @@ def nodes(arguments):
 
 def node(arguments, package, name, namespace='', **parameters):
     """Start one node; what was not given leaves its parameter alone."""
-    given = {parameter: text for parameter, text in parameters.items() if text}
+    given = {parameter: value for parameter, value in parameters.items() if value != ''}
     return Node(
         package=package,
         executable=f'{name}_node',
@@ -98,6 +134,8 @@ def node(arguments, package, name, namespace='', **parameters):
         namespace=namespace,
         parameters=[arguments['params_file'], given],
         output='screen',
+        respawn=True,
+        respawn_delay=RESPAWN_DELAY_S,
     )
 
 
@@ -142,6 +180,7 @@ def composed(arguments):
 
 def transforms(arguments):
     """Turn the optical frames of the cameras away from the panorama's, by half the angle each."""
+    check_tf2()  # nothing has been started yet
     yaw_deg = angle_between_cameras_deg(arguments['yaw_deg'], arguments['overlap_file'])
     if yaw_deg is None:
         return []
@@ -166,10 +205,7 @@ def transforms(arguments):
 def angle_between_cameras_deg(given, path):
     """Give the angle as it was given or else measured, deg; None if it is not measured yet."""
     if given:
-        with suppress(ValueError):
-            if isfinite(yaw_deg := float(given)):
-                return yaw_deg
-        raise RuntimeError(f"yaw_deg is '{given}'; expected a number")
+        return number('yaw_deg', given)
     if not path:
         raise RuntimeError('transforms:=true needs yaw_deg or overlap_file')
     if Path(path).exists():
@@ -209,6 +245,7 @@ def generate_launch_description():
             SetEnvironmentVariable(
                 PROFILES, os.environ.get(PROFILES, str(CONFIG / 'fastdds.xml'))
             ),
+            SetEnvironmentVariable(BOUND, '1'),
             OpaqueFunction(function=start),
         ]
     )

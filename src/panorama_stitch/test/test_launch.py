@@ -1,4 +1,4 @@
-"""Which nodes the launch file starts, with which parameters; without launch, and with it."""
+"""Which nodes the launch file starts, with which parameters; `test/test_launch.py` starts them."""
 
 import importlib.util
 import sys
@@ -7,6 +7,7 @@ from types import ModuleType, SimpleNamespace
 
 import pytest
 import yaml
+from ament_index_python.packages import PackageNotFoundError
 
 FILE = Path(__file__).parents[1] / 'launch' / 'panorama.launch.py'
 CAPTURES = {'left/capture', 'right/capture'}
@@ -53,6 +54,7 @@ class Rig:
             vars(module).update(content)
             monkeypatch.setitem(sys.modules, name, module)
         self.file = loaded()
+        monkeypatch.setattr(self.file, 'get_package_prefix', lambda _: '/usr')
 
     def start(self, **given):
         """Give the nodes by name and the value of use_sim_time."""
@@ -100,9 +102,9 @@ def test_which_nodes(rig, given, expected):
 
 
 def test_what_is_given_reaches_the_nodes_that_it_concerns(rig):
-    nodes, sim_time = rig.start(left_source='0', frame_rate_hz='15', use_sim_time='TRUE')
-    assert rig.given(nodes['left/capture']) == {'source': '0', 'frame_rate_hz': '15'}
-    assert rig.given(nodes['right/capture']) == {'frame_rate_hz': '15'}
+    nodes, sim_time = rig.start(left_source='0', frame_rate_hz='15', use_sim_time='on')
+    assert rig.given(nodes['left/capture']) == {'source': '0', 'frame_rate_hz': 15.0}
+    assert rig.given(nodes['right/capture']) == {'frame_rate_hz': 15.0}
     assert rig.given(nodes['stitch']) == {}
     assert sim_time is True
     assert nodes['left/capture'].package == 'fisheye_capture'
@@ -135,8 +137,9 @@ def test_files_in_the_home(rig, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ('given', 'words'),
     [
-        ({'composed': 'yes'}, "composed is 'yes'; expected true or false"),
-        ({'use_sim_time': '1'}, "use_sim_time is '1'; expected true or false"),
+        ({'composed': 'maybe'}, "composed is 'maybe'; expected true or false"),
+        ({'use_sim_time': '2'}, "use_sim_time is '2'; expected true or false"),
+        ({'frame_rate_hz': 'fast'}, "frame_rate_hz is 'fast'; expected a number"),
         ({'vfov_deg': '60'}, "no argument 'vfov_deg'; expected composed, robot, "),
         ({'transforms': 'true'}, 'needs yaw_deg or overlap_file'),
         ({'transforms': 'true', 'yaw_deg': 'abc'}, "yaw_deg is 'abc'; expected a number"),
@@ -146,6 +149,30 @@ def test_files_in_the_home(rig, tmp_path, monkeypatch):
 def test_what_cannot_be_meant_is_refused(rig, given, words):
     with pytest.raises(RuntimeError, match=words):
         rig.start(**given)
+
+
+@pytest.mark.parametrize('word', ['true', 'True', '1', 'yes', 'on'])
+def test_words_for_true(rig, word):
+    assert set(rig.start(composed=word)[0]) == {'panorama'}
+
+
+@pytest.mark.parametrize('word', ['false', '0', 'no', 'OFF'])
+def test_words_for_false(rig, word):
+    assert set(rig.start(composed=word)[0]) == CAPTURES | REST
+
+
+def test_every_node_is_started_again_after_a_pause(rig):
+    nodes, _ = rig.start(view='true')
+    assert all(node.respawn and node.respawn_delay > 0 for node in nodes.values())
+
+
+def test_nothing_starts_where_the_transforms_cannot(rig, monkeypatch):
+    def missing(package):
+        raise PackageNotFoundError(package)
+
+    monkeypatch.setattr(rig.file, 'get_package_prefix', missing)
+    with pytest.raises(RuntimeError, match='transforms:=true needs the package tf2_ros'):
+        rig.start(transforms='true', yaw_deg='140')
 
 
 def test_a_file_that_includes_this_one_has_arguments_of_its_own(rig, monkeypatch):
@@ -184,20 +211,9 @@ def test_a_profile_that_the_user_chose_stays(rig, monkeypatch, chosen):
     monkeypatch.delenv('FASTRTPS_DEFAULT_PROFILES_FILE', raising=False)
     if chosen:
         monkeypatch.setenv('FASTRTPS_DEFAULT_PROFILES_FILE', chosen)
-    (profile,) = (a[1] for a in rig.file.generate_launch_description() if type(a) is tuple)
+    (profile,) = (
+        words[1]
+        for words in rig.file.generate_launch_description()
+        if type(words) is tuple and words[0] == rig.file.PROFILES
+    )
     assert profile == chosen or (not chosen and profile.endswith('/fastdds.xml'))
-
-
-def test_launch_itself_takes_it():
-    pytest.importorskip('launch_ros', reason='launch_ros is not installed')
-    launch = importlib.import_module('launch')
-    file = loaded()
-    context = launch.LaunchContext()
-    context.launch_configurations['left_source'] = '0'
-    started = [entity.visit(context) for entity in file.generate_launch_description().entities]
-    simulated, *nodes = started[-1]
-    simulated.visit(context)
-    for node in nodes:
-        node._perform_substitutions(context)
-    names = {node.node_name.strip('/') for node in nodes}
-    assert names == CAPTURES | REST
