@@ -9,16 +9,11 @@ from contextlib import suppress
 from math import cos, degrees, isfinite, radians, sin
 from pathlib import Path
 
-<<<<<<< HEAD
-from ament_index_python.packages import get_package_share_directory
-=======
-import yaml
 from ament_index_python.packages import (
     PackageNotFoundError,
     get_package_prefix,
     get_package_share_directory,
 )
->>>>>>> fa1e1df (Start nodes again, end them with their launch, and hand numbers on)
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironmentVariable
 from launch_ros.actions import Node, SetParameter
 
