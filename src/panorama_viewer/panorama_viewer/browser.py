@@ -5,7 +5,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, NamedTuple
 
-from aiohttp import WSCloseCode, WSMsgType, web
+from aiohttp import WSCloseCode, web
 
 from panorama_viewer.connection import Connection
 
@@ -141,11 +141,9 @@ class Browser:
 async def dismiss(
     stream: web.WebSocketResponse, connection: Connection, code: WSCloseCode, reason: str
 ) -> None:
-    """Close a WebSocket for a reason, without hearing what else it sends."""
+    """Close a WebSocket for a reason; its connection ends soon whether it answers or not."""
     connection.set_deadline(_FAREWELL_S)
-    with suppress(ConnectionError):
-        await stream.send_frame(code.to_bytes(2, 'big') + reason.encode(), WSMsgType.CLOSE)
-    connection.transport.close()
+    await stream.close(code=code, message=reason.encode())
 
 
 def _now_s() -> float:

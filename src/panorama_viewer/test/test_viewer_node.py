@@ -24,6 +24,7 @@ from sensor_msgs.msg import CompressedImage
 from fisheye_bridge.qos import IMAGE, LATCHED
 from fisheye_bridge.stamps import stamp_of
 from fisheye_geometry.errors import SettingError
+from panorama_viewer import viewer_node
 from panorama_viewer.viewer_node import ViewerNode
 
 DEADLINE_S = 15.0
@@ -244,6 +245,22 @@ def test_the_button_says_so_where_nobody_measures(ros):
     status, words = press_calibrate(node)
     assert status == 503
     assert 'nobody offers calibrate_overlap' in words
+
+
+def test_a_bug_in_the_page_stands_in_the_diagnostics_and_the_rest_goes_on(ros, monkeypatch):
+    stitching, node = Stitching(ros.context), viewer(ros, port=0)
+    stitching.create_service(CalibrateOverlap, 'calibrate_overlap', lambda _, response: response)
+    heard = []
+    stitching.create_subscription(
+        DiagnosticArray, '/diagnostics', lambda message: heard.extend(message.status), 10
+    )
+    ros.start(stitching, node)
+    monkeypatch.setattr(viewer_node, 'CalibrateOverlap', None)
+    wait_for(lambda: press_calibrate(node)[0] == 500)
+    wait_for(lambda: any(s.name == 'rig/viewer' and s.level == b'\2' for s in heard))
+    told = next(s.message for s in heard if s.name == 'rig/viewer' and s.level == b'\2')
+    assert told.startswith('a part of the page failed: AttributeError in viewer_node.py')
+    assert look(node) == JPEG
 
 
 def test_a_port_that_cannot_be_had_is_a_sentence(ros):
