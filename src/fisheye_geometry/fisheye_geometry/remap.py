@@ -177,7 +177,7 @@ class RemapTable:
         return out
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=4)
 def remap_table(
     source: Lens | Surface,
     surface: Surface,
@@ -194,7 +194,7 @@ def remap_table(
     Returns
     -------
     RemapTable
-        Shared with all who asked for the same; the last 16 are kept.
+        Shared with all who asked for the same; the last 4 are kept: one takes 7 bytes a pixel.
 
     Raises
     ------

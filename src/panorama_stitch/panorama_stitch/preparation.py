@@ -10,9 +10,10 @@ from typing import NamedTuple
 
 from fisheye_geometry.background import Background
 from fisheye_geometry.errors import FisheyeError, OverlapError
+from fisheye_geometry.surface import Surface
 from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.overlap_file import read_overlaps, write_overlaps
-from panorama_stitch.overlap_result import Overlap
+from panorama_stitch.overlap_result import Overlap, side_by_side
 from panorama_stitch.settings import PanoramaOutputSettings
 from panorama_stitch.stitcher import Group, Stitcher
 
@@ -114,8 +115,8 @@ class Preparation:
         Returns
         -------
         Future
-            Of a list of `Overlap`. Where no overlap is found, one that was found before stays in
-            use. With a `FisheyeError` nothing has changed.
+            Of a list of `Overlap`. Where no overlap is found, or none that can be believed, one
+            that was found before stays in use. With a `FisheyeError` nothing has changed.
         """
         return self._background.do(self._calibrate, method, save)
 
@@ -126,7 +127,11 @@ class Preparation:
     def _failed(self, error: FisheyeError) -> None:
         self.trouble = str(error)
         self._warn(self.trouble)
-        self._due_s = monotonic() + _FIRST_PAUSE_S
+        self._wait(_FIRST_PAUSE_S)
+
+    def _wait(self, pause_s: float) -> None:
+        """Try again after a pause, or sooner where something was changed meanwhile."""
+        self._due_s = min(self._due_s, monotonic() + pause_s)
 
     def _prepare(self, newest: _Remembered, is_live: bool) -> None:
         """Find overlaps if there are none, and build the compositor that uses them."""
@@ -142,7 +147,7 @@ class Preparation:
                 self._due_s = 0.0
                 return
             if not all(overlap.found for overlap in overlaps):
-                self._due_s = monotonic() + self._pause_s
+                self._wait(self._pause_s)
                 self._pause_s = min(2 * self._pause_s, _LONGEST_PAUSE_S)
         elif not found and settings.auto_calibrate and is_live:
             # What was remembered was forgotten a moment ago; the next group can be measured.
@@ -158,6 +163,9 @@ class Preparation:
             raise OverlapError('overlap_file is empty; expected the file to save the overlap in')
         groups, surfaces = self._groups(), stitcher.surfaces
         measured = self._measured(groups, method or settings.method)
+        if settings.method != 'paper':
+            pairs = zip(measured, surfaces[:-1], strict=True)
+            measured = [_believed(new, surface, settings.min_confidence) for new, surface in pairs]
         former = stitcher.overlaps or measured
         overlaps = [
             new if new.found or not old.found else old
@@ -192,3 +200,25 @@ class Preparation:
                 stitcher.adopt(overlaps, surfaces)
         except FisheyeError as error:
             self._warn(f'{error}; the overlap is measured instead')
+
+
+def _believed(result: Overlap, left: Surface, needed: float) -> Overlap:
+    """Return a result as it is, or as not found where its confidence is less than is needed.
+
+    The published rule always names an offset: asked for once, it must not ruin a rig that runs.
+    """
+    if not result.found or result.confidence >= needed:
+        return result
+    message = (
+        f'{result.message}; not used: its confidence is {result.confidence:.2f}, '
+        f'{needed:.2f} is needed (with the parameter method:=paper it is used all the same)'
+    )
+    aside = side_by_side(left, result.method, message)
+    return replace(
+        result,
+        found=False,
+        offset_x_px=aside.offset_x_px,
+        offset_y_px=aside.offset_y_px,
+        overlap_px=aside.overlap_px,
+        message=message,
+    )

@@ -305,3 +305,39 @@ def test_a_lens_that_changes_with_each_frame_stops_no_panorama(make_line, pictur
         line.live.place('left', lens, SETTINGS.surface_of(lens))
         line.feed(pictures, lambda seen=count + index: len(line.published) >= seen, 'the next one')
     assert line.live.unpaired_s < SETTINGS.stale_after_s
+
+
+def test_the_published_rule_asked_for_once_ruins_no_rig(make_line, pictures):
+    line = make_line(replace(SETTINGS, min_confidence=0.5))
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    good = in_use(line)
+    (asked,) = line.live.calibrate('paper', save=False).result(DEADLINE_S)
+    assert (asked.method, asked.found) == ('paper', False)
+    assert asked.confidence < 0.5
+    assert 'the most similar particles put the right view at' in asked.message
+    assert '0.50 is needed (with the parameter method:=paper' in asked.message
+    assert in_use(line) == good
+    line.live.apply(replace(SETTINGS, method='paper', min_confidence=0.5))
+    (asked,) = line.live.calibrate('', save=False).result(DEADLINE_S)
+    assert asked.found
+    assert in_use(line) == asked
+
+
+def test_a_setting_that_changes_while_an_overlap_is_sought_need_not_wait(make_line, pictures):
+    line = make_line(replace(SETTINGS, stale_after_s=60.0))
+    dark = {camera: np.zeros_like(picture) for camera, picture in pictures.items()}
+    measure, is_measuring, go_on = line.live.stitcher.measure, threading.Event(), threading.Event()
+
+    def measure_late(*arguments):
+        is_measuring.set()
+        go_on.wait(DEADLINE_S)
+        return measure(*arguments)
+
+    line.live.stitcher.measure = measure_late
+    line.feed(dark, is_measuring.is_set, 'a search')
+    line.live.apply(replace(SETTINGS, stale_after_s=60.0, crop='none', feather_deg=3.0))
+    is_measuring.clear()
+    go_on.set()
+    begin = time.monotonic()
+    line.feed(dark, is_measuring.is_set, 'the next search')
+    assert time.monotonic() - begin < 2.0, 'the pause between two searches'
