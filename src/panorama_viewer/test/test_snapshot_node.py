@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import rclpy
 from fisheye_msgs.msg import Projection
-from image_message import to_message
 from rclpy.executors import SingleThreadedExecutor
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from fisheye_bridge import shared_memory
+from fisheye_bridge.images import ImageBuffer
 from fisheye_bridge.projection import projection_of
 from fisheye_bridge.qos import IMAGE, LATCHED
 from fisheye_bridge.stamps import stamp_of
@@ -41,8 +41,11 @@ def test_a_panorama_is_taken_with_its_surface_and_any_stamp(context, stamp_ns):
     projection.publish(projection_of(SURFACE, header))
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
+    buffer = ImageBuffer(SURFACE.width, SURFACE.height, 'rgb8')
+    buffer.array[:] = PANORAMA[..., ::-1]
+    buffer.message.header = header
     for _ in range(SPINS):
-        image.publish(to_message(PANORAMA[..., ::-1], 'rgb8', header))
+        image.publish(buffer.message)
         executor.spin_once(timeout_sec=0.02)
         if node.taken:
             break
