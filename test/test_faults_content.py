@@ -74,9 +74,18 @@ def test_compressed_images(message):
 
 @examples
 @given(camera_infos())
-def test_camera_infos(message):
-    with suppress(FisheyeError):
-        UndistortSettings().surface_of(camera_of(message).lens)
+def test_a_camera_info_that_is_taken_can_be_saved_and_used_at_the_next_start(
+    tmp_path_factory, message
+):
+    try:
+        camera = camera_of(message, 'left')
+    except FisheyeError:
+        return
+    path = tmp_path_factory.getbasetemp() / 'taken.yaml'
+    write_camera(path, camera)
+    again = read_camera(path)
+    assert again.lens == camera.lens
+    UndistortSettings().surface_of(again.lens)
 
 
 @examples

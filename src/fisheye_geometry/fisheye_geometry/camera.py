@@ -11,6 +11,9 @@ from fisheye_geometry.lens import MAX_PICTURE_SIDE_PX, Lens
 IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 _PROBES = 9
 """Pixels a side of the grid on which a lens is tried."""
+_MAX_ASPECT = 16
+"""Of the focal lengths: pixels that are binned one way only."""
+_MIN_ANGLE_RAD = np.radians(1.0)
 
 
 @dataclass(frozen=True)
@@ -31,7 +34,7 @@ class Camera:
     Raises
     ------
     CalibrationError
-        If R or P is not finite, or the picture shows nothing of what the lens maps.
+        If R or P is not finite, or no camera can have such a lens.
     """
 
     name: str
@@ -44,22 +47,7 @@ class Camera:
             for value in values:
                 if not abs(value) <= sys.float_info.max:
                     raise CalibrationError(f'{name} holds {value}; expected finite numbers')
-        lens = self.lens
-        for name, center, side in (
-            ('x', lens.center_x_px, lens.width),
-            ('y', lens.center_y_px, lens.height),
-        ):
-            if not -MAX_PICTURE_SIDE_PX <= center <= side + MAX_PICTURE_SIDE_PX:
-                raise CalibrationError(
-                    f'center_{name}_px is {center:g}; expected it within {MAX_PICTURE_SIDE_PX} px '
-                    f'of the picture of {lens.width}x{lens.height} px'
-                )
-        if not self._sees_something():
-            raise CalibrationError(
-                f'no ray meets the picture of {lens.width}x{lens.height} px with the principal '
-                f'point ({lens.center_x_px:g}, {lens.center_y_px:g}) px and the focal length '
-                f'{lens.focal_x_px:g} px; expected a lens that sees some of it'
-            )
+        _check_plausible(self.lens)
 
     def misfit(self, width: int, height: int) -> str:
         """Say why pictures of a size, px, cannot be of this camera; '' if they can."""
@@ -77,11 +65,36 @@ class Camera:
             return np.array(self.projection).reshape(3, 4)
         return np.hstack([self.lens.matrix, np.zeros((3, 1))])
 
-    def _sees_something(self) -> bool:
-        lens = self.lens
-        x, y = np.linspace(0, lens.width - 1, _PROBES), np.linspace(0, lens.height - 1, _PROBES)
-        _, seen = lens.unproject(np.stack(np.meshgrid(x, y), axis=-1))
-        return bool(seen.any())
+
+def _check_plausible(lens: Lens) -> None:
+    """Refuse numbers that a lens can have, but no camera."""
+    low, high = sorted((lens.focal_x_px, lens.focal_y_px))
+    if low < 1 or high > _MAX_ASPECT * low:
+        raise CalibrationError(
+            f'the focal lengths are {lens.focal_x_px:g} and {lens.focal_y_px:g} px; expected 1 px '
+            f'or more, and no more than {_MAX_ASPECT} times as much one way as the other'
+        )
+    if lens.max_angle_rad < _MIN_ANGLE_RAD:
+        raise CalibrationError(
+            f'the distortion of the lens ends {np.degrees(lens.max_angle_rad):.2g} degrees off '
+            f'its axis; expected {np.degrees(_MIN_ANGLE_RAD):g} or more'
+        )
+    for name, center, side in (
+        ('x', lens.center_x_px, lens.width),
+        ('y', lens.center_y_px, lens.height),
+    ):
+        if not -MAX_PICTURE_SIDE_PX <= center <= side + MAX_PICTURE_SIDE_PX:
+            raise CalibrationError(
+                f'center_{name}_px is {center:g}; expected it within {MAX_PICTURE_SIDE_PX} px '
+                f'of the picture of {lens.width}x{lens.height} px'
+            )
+    x, y = np.linspace(0, lens.width - 1, _PROBES), np.linspace(0, lens.height - 1, _PROBES)
+    if not lens.unproject(np.stack(np.meshgrid(x, y), axis=-1))[1].any():
+        raise CalibrationError(
+            f'no ray meets the picture of {lens.width}x{lens.height} px with the principal '
+            f'point ({lens.center_x_px:g}, {lens.center_y_px:g}) px and the focal length '
+            f'{lens.focal_x_px:g} px; expected a lens that sees some of it'
+        )
 
 
 def camera_from(name: str, lens: Lens, rectification, projection) -> Camera:

@@ -43,6 +43,24 @@ def test_a_lens_beside_its_picture_is_refused():
         Camera('', lens)
 
 
+@pytest.mark.parametrize(
+    ('focal_px', 'd', 'words'),
+    [
+        (
+            (1e6, 223),
+            [0] * 5,
+            r'focal lengths are 1e\+06 and 223 px; expected 1 px .*',
+        ),
+        ((0.1, 0.1), [0] * 5, 'focal lengths are 0.1 and 0.1 px; expected 1 px or more'),
+        ((223, 223), [0, 0, 0, -1e6, 0], 'ends 0 degrees off its axis; expected 1 or more'),
+    ],
+)
+def test_what_no_camera_has_is_refused(focal_px, d, words):
+    matrix = [focal_px[0], 0, 319.5, 0, focal_px[1], 239.5, 0, 0, 1]
+    with pytest.raises(CalibrationError, match=words):
+        Camera('', make_lens('plumb_bob', 640, 480, matrix, d))
+
+
 def test_zeros_of_a_message_mean_that_nothing_is_given():
     assert camera_from('a', LENS, [0.0] * 9, [0.0] * 12) == Camera('a', LENS)
 
