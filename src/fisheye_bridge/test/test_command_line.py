@@ -3,15 +3,26 @@
 import signal
 import sys
 import threading
+from dataclasses import dataclass
 
 import pytest
 from rclpy.node import Node
 
 from fisheye_bridge.running import run
+from fisheye_geometry.errors import SettingError
+from fisheye_geometry.settings import setting
+
+
+@dataclass(frozen=True)
+class ExampleSettings:
+    rate_hz: float = setting(30.0, 'How often.', minimum=1, maximum=60, live=True)
+    cameras: tuple[str, ...] = setting(('left', 'right'), 'From left to right.')
 
 
 class ExampleNode(Node):
     """Words to nothing."""
+
+    SETTINGS = (('', ExampleSettings), ('CAMERA.', ExampleSettings))
 
     def __init__(self):
         super().__init__('example')
@@ -26,9 +37,9 @@ def started(monkeypatch, capfd):
     monkeypatch.setattr(threading, 'Timer', lambda *_: threading.Thread(target=int))
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
 
-    def start(*words):
+    def start(*words, node_class=ExampleNode):
         monkeypatch.setattr(sys, 'argv', ['example_node', *words])
-        code = run(ExampleNode)
+        code = run(node_class)
         return code, ''.join(capfd.readouterr())
 
     yield start
@@ -49,6 +60,30 @@ def test_help_says_how_to_give_parameters(started, words):
     assert code == 0
     assert '--ros-args [-p NAME:=VALUE]' in said
     assert 'Words to nothing.' in said
+    assert '  rate_hz* [30.0]: 1 to 60\n      How often.\n' in said
+    assert '  CAMERA.cameras [[left, right]]\n      From left to right.\n' in said
+
+
+class RefusingNode(Node):
+    """One that does not like what it is given."""
+
+    def __init__(self):
+        super().__init__('example')
+        raise SettingError('speed is 7; expected 1 to 5')
+
+
+@pytest.mark.parametrize(
+    ('words', 'name'),
+    [
+        ((), 'test_command_line'),
+        (('-r', '__ns:=/left'), 'left.test_command_line'),
+        (('-r', '__ns:=/left', '-r', '__node:=eye'), 'left.eye'),
+    ],
+)
+def test_a_refusal_says_which_node_it_is(started, words, name):
+    code, said = started('--ros-args', *words, node_class=RefusingNode)
+    assert code == 1
+    assert f'[{name}]: speed is 7; expected 1 to 5' in said
 
 
 @pytest.mark.parametrize('words', [('--foo',), ('-p', 'x'), ('-r', '__ns:=bad-ns')])

@@ -25,6 +25,8 @@ from fisheye_geometry.yaml_file import is_missing
 class CaptureNode(Node):
     """A source of pictures to image_raw and camera_info."""
 
+    SETTINGS = (('', CaptureSettings),)
+
     def __init__(self, **kwargs):
         super().__init__('capture', **kwargs)
         self._declared = Parameters(self, CaptureSettings)

@@ -31,3 +31,7 @@ class OverlapError(FisheyeError):
 
 class SettingError(FisheyeError):
     """A parameter outside its type, range or choices."""
+
+
+class BugError(FisheyeError):
+    """What no code expected, in a part that the rest can do without."""

@@ -5,7 +5,7 @@ import threading
 import pytest
 
 from fisheye_geometry.background import Background
-from fisheye_geometry.errors import FisheyeError, OverlapError
+from fisheye_geometry.errors import BugError, FisheyeError, OverlapError
 
 
 @pytest.fixture
@@ -29,9 +29,26 @@ def test_a_sentence_is_told(background):
     assert [str(error) for error in background.told] == ['no']
 
 
-def test_a_bug_is_not_swallowed(background, monkeypatch):
-    bugs = []
-    monkeypatch.setattr(threading, 'excepthook', lambda details: bugs.append(details.exc_type))
-    background.do(fail, ZeroDivisionError())
+def test_a_bug_is_told_with_its_place_and_leaves_the_thread_alive(background):
+    future = background.do(fail, ZeroDivisionError('oh'))
+    with pytest.raises(
+        BugError, match=r'a bug, ZeroDivisionError: oh \(test_background.py:\d+, fail'
+    ):
+        future.result()
+    assert background.do(int, '7').result() == 7
+    assert [type(error) for error in background.told] == [BugError]
+
+
+def test_what_was_not_begun_is_cancelled(background):
+    begun, may_end = threading.Event(), threading.Event()
+
+    def slow():
+        begun.set()
+        may_end.wait()
+
+    first, second = background.do(slow), background.do(int)
+    begun.wait()
+    threading.Timer(0.05, may_end.set).start()
     background.stop()
-    assert (bugs, background.told) == ([ZeroDivisionError], [])
+    assert first.result() is None
+    assert second.cancelled()

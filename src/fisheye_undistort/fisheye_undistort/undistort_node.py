@@ -20,6 +20,8 @@ from fisheye_undistort.settings import UndistortSettings
 class UndistortNode(Node):
     """image_raw and camera_info to image_rect and projection."""
 
+    SETTINGS = (('', UndistortSettings),)
+
     def __init__(self, **kwargs):
         super().__init__('undistort', **kwargs)
         self._camera = self._correction = self._buffer = self._asked = None

@@ -27,6 +27,8 @@ TOPIC = 'topic'
 class PanoramaNode(PanoramaBase):
     """The cameras themselves to panorama/image."""
 
+    SETTINGS = (('', PanoramaSettings), ('CAMERA.', CameraSettings))
+
     def __init__(self, **kwargs):
         super().__init__('panorama', PanoramaSettings, **kwargs)
         self._eyes = [_eye(self, camera) for camera in self.settings.cameras]

@@ -17,6 +17,8 @@ from panorama_stitch.settings import StitchSettings
 class StitchNode(PanoramaBase):
     """CAMERA/image_rect and CAMERA/projection of each camera to panorama/image."""
 
+    SETTINGS = (('', StitchSettings),)
+
     def __init__(self, **kwargs):
         super().__init__('stitch', StitchSettings, **kwargs)
         self._eyes = [_Eye(self, camera) for camera in self.settings.cameras]

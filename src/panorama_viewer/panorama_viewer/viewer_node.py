@@ -31,6 +31,8 @@ _TELL_S = 0.5
 class ViewerNode(Node):
     """panorama/image/compressed, and what is known of it, to browsers."""
 
+    SETTINGS = (('', ViewerSettings),)
+
     def __init__(self, **kwargs):
         super().__init__('viewer', **kwargs)
         self._declared = Parameters(self, ViewerSettings)
