@@ -24,6 +24,8 @@ _CLOSE = 0.15
 """An offset whose score is this much below the best one may still be the right one."""
 _CLEARLY = 0.03
 """A difference in fit that is not by chance."""
+_AS_GOOD = 0.002
+"""A difference in fit that the noise of a JPEG makes."""
 _DISTINCT_RATIO, _DISTINCT_MARGIN = 1.4, 0.1
 """Where the scene is distinct, any other offset leaves this many times more unexplained, and its
 fit is this much lower; less can come from noise, or from the edges of the pictures."""
@@ -163,8 +165,16 @@ def _refine(left, right, surface_right, level_y_px, pose, tilt) -> Pose:
     left, right = left[:, start:], right[:, : left.shape[1] - round(pose.x_px) + margin]
     facing = face(left, right, surface_right, level_y_px, _FINE_PX_PER_DEG)
     begin = replace(pose, x_px=pose.x_px - start).scaled(1 / facing.step)
-    pose = refine(facing, begin, tilt).scaled(facing.step)
+    pose = _level_if_as_good(facing, refine(facing, begin, tilt)).scaled(facing.step)
     return replace(pose, x_px=pose.x_px + start)
+
+
+def _level_if_as_good(facing: Facing, pose: Pose) -> Pose:
+    """Leave out a tilt that closes the seam no better than none: noise alone would make one."""
+    start = replace(pose, y_px=facing.level_y_px, pitch_rad=0.0, roll_rad=0.0)
+    level = refine(facing, start, False)
+    as_good = certainty(facing, level) >= certainty(facing, pose) - _AS_GOOD
+    return level if as_good else pose
 
 
 def _explore(facing: Facing, search: Search) -> Landscape | None:

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from math import nan
 
+import cv2
 import numpy as np
 import pytest
 
@@ -120,3 +121,25 @@ def test_a_dark_circle_is_no_part_of_the_panorama(pictures):
     assert circle.look(lit)
     lens = LENS.seen_within(circle.angle_rad)
     assert SETTINGS.surface_of(lens).width < SETTINGS.surface_of(LENS).width
+
+
+def over_jpeg(picture, quality):
+    coded = cv2.imencode('.jpg', picture, (cv2.IMWRITE_JPEG_QUALITY, quality))[1]
+    return cv2.imdecode(coded, cv2.IMREAD_COLOR)
+
+
+@pytest.mark.parametrize('quality', [95, 80, 60])
+def test_jpeg_makes_no_tilt(pictures, quality):
+    received = [over_jpeg(picture, quality) for picture in pictures]
+    (overlap,) = stitcher_of().measure([received], SETTINGS, 'particles')
+    assert abs(overlap.turn.pitch_rad) < np.radians(0.05)
+    assert abs(overlap.turn.roll_rad) < np.radians(0.05)
+    assert abs(overlap.offset_y_px) < 0.1
+
+
+def test_a_small_tilt_is_measured():
+    turns = Turn(yaw_rad=-YAW / 2), Turn(YAW / 2, np.radians(0.3), np.radians(0.2))
+    tilted = [Scene().view(LENS, turn).frame(0) for turn in turns]
+    (overlap,) = stitcher_of().measure([tilted], SETTINGS, 'particles')
+    assert np.degrees(overlap.turn.pitch_rad) == pytest.approx(0.3, abs=0.1)
+    assert np.degrees(overlap.turn.roll_rad) == pytest.approx(0.2, abs=0.1)
