@@ -16,13 +16,27 @@ def camera_of(message: CameraInfo, name: str = '') -> Camera:
     CalibrationError
         If the camera is not calibrated, or the numbers describe no lens or no part of its sensor.
     """
+    return readout_of(message).of(camera_from(name, _lens(message), message.r, message.p))
+
+
+def lens_of(message: CameraInfo) -> Lens:
+    """Return the lens of that camera, whatever R and P are, which nobody needs for it.
+
+    Raises
+    ------
+    CalibrationError
+        As `camera_of` does.
+    """
+    return readout_of(message).of(Camera('', _lens(message))).lens
+
+
+def _lens(message: CameraInfo) -> Lens:
     if not any(message.k):
         raise CalibrationError(
             'the camera is not calibrated (K is zero); make a calibration file with '
             'calibrate_lens and name it in camera_info_url'
         )
-    lens = make_lens(message.distortion_model, message.width, message.height, message.k, message.d)
-    return readout_of(message).of(camera_from(name, lens, message.r, message.p))
+    return make_lens(message.distortion_model, message.width, message.height, message.k, message.d)
 
 
 def readout_of(message: CameraInfo) -> Readout:

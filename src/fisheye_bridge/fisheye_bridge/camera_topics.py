@@ -8,7 +8,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
-from fisheye_bridge.camera_info import camera_of, readout_of
+from fisheye_bridge.camera_info import lens_of, readout_of
 from fisheye_bridge.diagnostics import ERROR, WARN, WARNING_PAUSE_S, Report
 from fisheye_bridge.qos import BEST_EFFORT_INPUT
 from fisheye_bridge.topics import ImageSubscription
@@ -137,7 +137,7 @@ class CameraSubscription:
         if content == self._refused and monotonic() < self._again_s:
             return
         try:
-            lens = camera_of(message).lens
+            lens = lens_of(message)
             if self._picture_size not in (None, (lens.width, lens.height)):
                 whole = f'{size[0]}x{size[1]} px'
                 part = '' if readout == Readout() else f' ({whole} with {readout})'

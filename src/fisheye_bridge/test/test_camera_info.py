@@ -5,7 +5,7 @@ import pytest
 from fisheye_msgs.msg import Projection
 from std_msgs.msg import Header
 
-from fisheye_bridge.camera_info import camera_info_of, camera_of
+from fisheye_bridge.camera_info import camera_info_of, camera_of, lens_of
 from fisheye_bridge.projection import projection_of, surface_of
 from fisheye_geometry.camera_file import Camera
 from fisheye_geometry.errors import CalibrationError, GeometryError
@@ -53,6 +53,12 @@ def test_a_cropped_and_binned_camera_is_that_of_its_pictures():
     assert (lens.width, lens.height) == (160, 240)
     ray, _ = LENS.unproject(np.array([300.5, 100.0]))  # between two pixels that became one
     assert lens.project(ray)[0] == pytest.approx([100.0, 60.0])
+
+
+def test_a_lens_needs_neither_r_nor_p():
+    message = camera_info_of(Camera('left', LENS), Header())
+    message.r, message.p = [float('nan')] * 9, [float('inf')] * 12
+    assert lens_of(message) == LENS
 
 
 def test_a_crop_that_is_not_on_the_sensor_is_refused():
