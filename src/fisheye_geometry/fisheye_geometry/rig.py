@@ -5,7 +5,7 @@ come from `pairs_of` alone; whatever is kept for each pair follows its order.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from math import degrees, pi
 from typing import NamedTuple
@@ -66,7 +66,9 @@ class Rig:
     cameras
         1 to 8.
     is_closed
-        Whether the last camera meets the first; a single one: whether it sees all around.
+        Whether the last camera and the first are neighbours too.
+    apart
+        Indices of the pairs whose rotation nobody knows: their pictures stand side by side.
 
     Raises
     ------
@@ -76,6 +78,7 @@ class Rig:
 
     cameras: tuple[RigCamera, ...]
     is_closed: bool = False
+    apart: tuple[int, ...] = ()
 
     def __post_init__(self):
         names = [camera.name for camera in self.cameras]
@@ -91,18 +94,15 @@ class Rig:
         """Neighbours, the closing pair last."""
         return pairs_of(len(self.cameras), self.is_closed)
 
-    @property
-    def yaws_rad(self) -> tuple[float, ...]:
-        """Bearings of the optical axes, each to the right of the one before: not within pi."""
-        return unwrapped([camera.attitude.yaw_rad for camera in self.cameras])
+    def relative(self, pair: Pair) -> Attitude:
+        """Return the attitude of the right camera in the frame of the left one."""
+        left, right = (self.cameras[index].attitude.matrix for index in pair)
+        return Attitude.of(left.T @ right)
 
-    def with_attitudes(self, attitudes: Sequence[np.ndarray]) -> 'Rig':
-        """Return the same cameras with other attitudes, rotations (3, 3)."""
-        cameras = zip(self.cameras, attitudes, strict=True)
-        return replace(
-            self,
-            cameras=tuple(replace(c, attitude=Attitude.of(matrix)) for c, matrix in cameras),
-        )
+    def yaw_between(self, pair: Pair) -> float:
+        """Return the angle between the axes about the level vertical, rad, to the right."""
+        left, right = (self.cameras[index].attitude.yaw_rad for index in pair)
+        return unwrapped([left, right])[1] - left
 
 
 def unwrapped(yaws_rad: Sequence[float]) -> tuple[float, ...]:
@@ -126,7 +126,7 @@ class Chain:
     attitudes
         Rotations (3, 3), one a camera, of rays of the camera to rays of the first one.
     is_closed
-        Whether the rotations lead around a ring.
+        Whether the last camera and the first show a common scene, and all rotations fit.
     residue_rad
         By how much they miss the way around; 0 where the closing pair has no rotation.
     message
@@ -146,6 +146,9 @@ def chain(
     ring: str = 'auto',
 ) -> Chain:
     """Find the attitudes of cameras from the rotations between neighbours.
+
+    Rotations that come back to the first camera do so whether the cameras stand all around or
+    just overlap in front: what they show decides (see `leads_around` where panoramas are made).
 
     Parameters
     ----------

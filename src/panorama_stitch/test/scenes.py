@@ -14,9 +14,9 @@ from fisheye_geometry.lens import FisheyeLens
 from fisheye_geometry.remap import LEVEL, RemapTable, Turn
 from fisheye_geometry.surface import Surface, surface_for
 from panorama_stitch.compose.placing import place
+from panorama_stitch.compose.posing import views_at_overlaps
 from panorama_stitch.compose.view import View
 from panorama_stitch.overlap_result import Overlap
-from panorama_stitch.posing import views_at_overlaps
 
 DATA = Path(os.environ.get('FISHEYE_DATA', ''))
 YAW_DEG = 140.0
@@ -95,14 +95,20 @@ def masked(picture: np.ndarray, values: np.ndarray) -> np.ndarray:
     return _seen_as(picture, values)
 
 
-def real_views(name: str, kind: str = 'cylindrical', turn: Turn = LEVEL):
-    """Give ((left, right) grey, surfaces) of a rig of real pictures, the right one turned."""
-    folder = DATA / 'rigs' / name
+def data_folder(name: str) -> Path:
+    """Return a folder of real pictures; skip the test where it is absent."""
+    folder = DATA / name
     if not folder.is_dir():
         message = f'{folder} is not there: real pictures are looked for in $FISHEYE_DATA'
         if os.environ.get('REQUIRE_DATA') == '1':
             pytest.fail(message)
         pytest.skip(message)
+    return folder
+
+
+def real_views(name: str, kind: str = 'cylindrical', turn: Turn = LEVEL):
+    """Give ((left, right) grey, surfaces) of a rig of real pictures, the right one turned."""
+    folder = data_folder('rigs') / name
     pictures, surfaces = [], []
     for side, attitude in (('left', LEVEL), ('right', turn)):
         camera = read_camera(folder / f'{side}.yaml').lens

@@ -18,9 +18,9 @@ from panorama_stitch.compose.compositor import BLENDS, Compositor
 from panorama_stitch.compose.gain import GainCompensation
 from panorama_stitch.compose.layout import covered, lay_out
 from panorama_stitch.compose.placing import place
+from panorama_stitch.compose.posing import views_at_overlaps
 from panorama_stitch.compose.view import View
 from panorama_stitch.overlap_result import Overlap
-from panorama_stitch.posing import views_at_overlaps
 
 YAW = np.radians(140)
 STAMP_NS = 700_000_000

@@ -14,6 +14,9 @@ from fisheye_geometry.surface_kind import KINDS
 from panorama_stitch.compose.parallel import share
 from panorama_stitch.compose.view import Cut, View, shown
 
+_WIDEST_STEP_RAD = np.radians(210)
+"""No two neighbours of a ring are farther apart: not even 240 degree lenses would meet."""
+
 
 @dataclass(eq=False)
 class PlacedView:
@@ -142,6 +145,20 @@ def place(views: Sequence[View], *, wraps: bool = False) -> Placed:
     surface = grid.window(left, top, right - left, bottom - top)
     share([partial(each.prepare, surface) for each in placed])
     return Placed(surface, tuple(placed), wraps)
+
+
+def leads_around(views: Sequence[View]) -> bool:
+    """Whether the last view of a rig reaches the first one behind; a single one: itself."""
+    surface = views[0].surface
+    if not surface.yaw_is_column_shift or any(view.shift_px[0] for view in views):
+        return False
+    grid = _grid(views[0], wraps=True)
+    axes = _axis_columns(views, grid)
+    (first, _), (_, last) = _columns(views[0], grid, axes[0]), _columns(views[-1], grid, axes[-1])
+    if len(views) == 1:
+        return last - first >= grid.width - 1
+    to_first = grid.width - (axes[-1] - axes[0])
+    return first + grid.width < last and 0 < to_first < _WIDEST_STEP_RAD * grid.focal_px
 
 
 def _grid(first: View, wraps: bool) -> Surface:

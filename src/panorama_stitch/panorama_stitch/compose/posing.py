@@ -1,13 +1,55 @@
-"""Posing: the attitudes of cameras that follow from offsets between their corrected pictures."""
+"""Posing: the views of a rig, from its attitudes or from offsets between corrected pictures."""
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from fisheye_geometry.attitude import Attitude
+from fisheye_geometry.rig import Rig
+from fisheye_geometry.surface import Surface
 from panorama_stitch.compose.view import View
 from panorama_stitch.overlap_result import Overlap, apart_rad
+
+
+def views_of_rig(
+    rig: Rig,
+    surfaces: Sequence[Surface],
+    *,
+    interpolation: str = 'linear',
+    seen: Sequence[np.ndarray | None] = (),
+    bodies: Sequence[np.ndarray | None] = (),
+) -> list[View]:
+    """Return the views of a rig's cameras.
+
+    Parameters
+    ----------
+    rig
+        In its level frame. Pairs that are apart stand side by side, whole.
+    surfaces
+        The corrected picture of each camera alone, of one kind and focal length.
+    interpolation, seen, bodies
+        As of `View`; () for None everywhere.
+    """
+    nothing = (None,) * len(rig.cameras)
+    shifts_px = [0.0]
+    for index, (left, right) in enumerate(pairwise(surfaces)):
+        beside_px = left.width + right.center_x_px - left.center_x_px
+        shifts_px.append(shifts_px[-1] + (beside_px if index in rig.apart else 0.0))
+    return [
+        View(
+            camera.source,
+            surface,
+            interpolation,
+            camera.attitude,
+            (shift_px - shifts_px[-1] / 2, 0.0),
+            *masks,
+        )
+        for camera, surface, shift_px, *masks in zip(
+            rig.cameras, surfaces, shifts_px, seen or nothing, bodies or nothing, strict=True
+        )
+    ]
 
 
 def views_at_overlaps(views: Sequence[View], overlaps: Sequence[Overlap]) -> list[View]:
@@ -23,7 +65,7 @@ def views_at_overlaps(views: Sequence[View], overlaps: Sequence[Overlap]) -> lis
     """
     yaws, shifts = [0.0], [np.zeros(2)]
     top_px = 0.0
-    for left, right, overlap in zip(views, views[1:], overlaps, strict=False):
+    for left, right, overlap in zip(views[:-1], views[1:], overlaps, strict=True):
         step_rad = apart_rad(overlap.offset_x_px, left.surface, right.surface)
         is_turn = overlap.found and left.surface.yaw_is_column_shift
         top_px += overlap.offset_y_px
