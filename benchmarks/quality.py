@@ -5,6 +5,7 @@ how much brighter than the left view the right one is beside the seam, after gai
 patches, then the mean and the worst of all rows, grey levels. The edge is the sharpest change of
 brightness from one column to the next that the scene does not show. The flicker is the standard
 deviation of the seam's brightness over time, of a still scene with noise (and the bouncing ball).
+Then rooms with near things, as `seams` says.
 """
 
 import argparse
@@ -16,6 +17,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 from pairs import YAWS, Pair, real_pairs, synthetic_pair
+from seams import judge_seams
+from similarity import similarity_map
 
 from fisheye_capture.scene import Scene
 from fisheye_geometry.errors import FisheyeError
@@ -47,7 +50,7 @@ class Quality:
 
 
 def main() -> int:
-    """Print the table and write out/quality.json; 1 if the synthetic rig misses a target."""
+    """Print the tables and write them to out/; 1 if a target is missed."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('--out', type=Path, default=Path('out'), help='where results go')
     out = parser.parse_args().out
@@ -72,7 +75,7 @@ def main() -> int:
             )
     out.mkdir(parents=True, exist_ok=True)
     (out / 'quality.json').write_text(json.dumps([vars(each) for each in results], indent=1))
-    return report(results)
+    return report(results) | judge_seams(out)
 
 
 def report(results: list[Quality]) -> int:
@@ -113,7 +116,7 @@ def judge(pair: Pair, compositor: Compositor, settings: PanoramaSettings, gains)
         drawn = out.astype(np.float32)
         fair = drawn * (np.vdot(truth, drawn) / np.vdot(drawn, drawn))
         psnr_db = 10 * np.log10(255**2 / np.mean((fair - truth) ** 2))
-        ssim = similarity(fair, truth)
+        ssim = float(similarity_map(fair, truth).mean())
     step, edge = at_the_seam(out, pair, compositor)
     seam = compositor.layout.seams[0]
     columns = slice(seam.begin - 3, seam.end + 3)
@@ -175,21 +178,6 @@ def flicker(pair: Pair, compositor: Compositor, columns: slice, gains) -> float:
         levels.append(level)
     scale = out[:, columns].mean() / levels[-1]
     return float(np.std(levels) * scale)
-
-
-def similarity(a: np.ndarray, b: np.ndarray) -> float:
-    """Mean SSIM of grey pictures (Z. Wang et al., 2004, https://doi.org/10.1109/TIP.2003.819861)."""
-    a, b = (cv2.cvtColor(np.float32(c), cv2.COLOR_BGR2GRAY) for c in (a, b))
-
-    def blur(c):
-        return cv2.GaussianBlur(c, (11, 11), 1.5)
-
-    mean_a, mean_b = blur(a), blur(b)
-    var_a, var_b = blur(a * a) - mean_a**2, blur(b * b) - mean_b**2
-    covariance = blur(a * b) - mean_a * mean_b
-    small, smaller = (0.01 * 255) ** 2, (0.03 * 255) ** 2
-    luminance = (2 * mean_a * mean_b + small) / (mean_a**2 + mean_b**2 + small)
-    return float((luminance * (2 * covariance + smaller) / (var_a + var_b + smaller)).mean())
 
 
 if __name__ == '__main__':

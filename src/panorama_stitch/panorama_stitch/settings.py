@@ -45,7 +45,8 @@ class PanoramaOutputSettings(OverlapSettings):
     blend: str = setting(
         'feather',
         'How neighbours meet: none lays the right over the left as published, feather fades, '
-        'multiband fades coarse detail over a wider strip than fine detail.',
+        'multiband fades coarse detail over a wider strip than fine detail, flow warps both until '
+        'near things meet.',
         choices=tuple(BLENDS),
         live=True,
     )

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from panorama_stitch.compose.blend import Feather, Multiband
+from panorama_stitch.compose.flow import Flow
 
 SHAPE = (90, 64, 3)
 EVERYWHERE = np.ones(SHAPE[:2], bool)
-BLENDS = [Feather, Multiband]
+BLENDS = [Feather, Multiband, Flow]
 HALO_LEVELS = 5
 """A multiband blend carries coarse detail, here of a step by 100 grey levels, that far."""
 
@@ -56,7 +57,7 @@ def test_a_multiband_blend_shows_fine_detail_of_one_view_only():
     stripes[::2] = 120
     shifted = stripes[::-1].copy()
     contrasts = []
-    for make in BLENDS:
+    for make in (Feather, Multiband):
         right = shifted.copy()
         make(EVERYWHERE, EVERYWHERE)(stripes.copy(), right)
         rows = right[20:70, :, 0].astype(int)

@@ -3,6 +3,7 @@
 `build` is the recipe. In the order in which to read: `view` (one camera's pictures), `placing`
 (the surface around the rig, and where each camera shows anything), `layout` and `crop` (which
 columns are whose), `seam` (where neighbours agree best), `fade` and `blend` (how they meet
-there), `gain` (how they become equally bright), `compositor` (all of it, frame after frame).
-`stale` marks cameras that went silent; `parallel` shares the rows between threads.
+there), `optical_flow` and `flow` (how near things meet, too), `gain` (how they become equally
+bright), `compositor` (all of it, frame after frame). `stale` marks cameras that went silent;
+`parallel` shares the rows between threads.
 """

@@ -20,22 +20,38 @@ class Blend(Protocol):
     ----------
     is_local
         Whether a row's blend follows from that row alone.
+    needs_overlap
+        Whether it needs what lies beside the seam, too, as far as both views show it.
     """
 
     is_local: bool
+    needs_overlap: bool
 
-    def __call__(self, left: np.ndarray, right: np.ndarray, rows: slice = slice(None)) -> None:
+    def __call__(
+        self,
+        left: np.ndarray,
+        right: np.ndarray,
+        rows: slice = slice(None),
+        *,
+        economical: bool = False,
+    ) -> None:
         """Blend views (height, width[, channels]) uint8 into the place of the right one.
 
-        `rows` says which rows these are, all where the blend is not local. The left view is of no
-        use any more afterwards.
+        The left view is of no use any more afterwards.
+
+        Parameters
+        ----------
+        rows
+            Which rows these are, all where the blend is not local.
+        economical
+            Leave out what takes long.
         """
 
 
 class Feather:
     """Fades from the left view into the right one."""
 
-    is_local = True
+    is_local, needs_overlap = True, False
 
     def __init__(
         self,
@@ -60,7 +76,14 @@ class Feather:
         total = np.maximum(weights[0] + weights[1], np.finfo(np.float32).tiny)
         self._weights = [np.ascontiguousarray(weight / total) for weight in weights]
 
-    def __call__(self, left: np.ndarray, right: np.ndarray, rows: slice = slice(None)) -> None:
+    def __call__(
+        self,
+        left: np.ndarray,
+        right: np.ndarray,
+        rows: slice = slice(None),
+        *,
+        economical: bool = False,
+    ) -> None:
         """As `Blend`."""
         left_weight, right_weight = self._weights
         cv2.blendLinear(left, right, left_weight[rows], right_weight[rows], dst=right)
@@ -74,7 +97,7 @@ class Multiband:
     https://doi.org/10.1145/245.247).
     """
 
-    is_local = False
+    is_local, needs_overlap = False, False
 
     def __init__(
         self,
@@ -94,7 +117,14 @@ class Multiband:
         self._levels: list[_Level] = []
         self._shape: tuple[int, ...] = ()
 
-    def __call__(self, left: np.ndarray, right: np.ndarray, rows: slice = slice(None)) -> None:
+    def __call__(
+        self,
+        left: np.ndarray,
+        right: np.ndarray,
+        rows: slice = slice(None),
+        *,
+        economical: bool = False,
+    ) -> None:
         """As `Blend`."""
         if self._shape != right.shape:
             self._shape = right.shape

@@ -10,15 +10,16 @@ import numpy as np
 
 from panorama_stitch.compose.blend import Feather, Multiband
 from panorama_stitch.compose.fade import Fade
+from panorama_stitch.compose.flow import Flow
 from panorama_stitch.compose.gain import GainCompensation
 from panorama_stitch.compose.layout import Layout, neighbours, wrapped
 from panorama_stitch.compose.parallel import share
 from panorama_stitch.compose.placing import Placed, PlacedView
 from panorama_stitch.compose.view import Cut
 
-_BLENDS = {'none': Feather, 'feather': Feather, 'multiband': Multiband}
-BLENDS = {'none': 0.0, 'feather': 1.0, 'multiband': 4.0}
-"""The ways to blend, and the width of the strip that each needs in units of `feather_deg`."""
+_BLENDS = {'none': Feather, 'feather': Feather, 'multiband': Multiband, 'flow': Flow}
+BLENDS = {'none': 0.0, 'feather': 1.0, 'multiband': 4.0, 'flow': 1.0}
+"""The ways to blend, and the width of the fade of each in units of `feather_deg`."""
 _ALL_ROWS = slice(None)
 _MOST_SLABS = 4
 """Rows are shared between so many threads at most: more would wait for Python's lock."""
@@ -75,7 +76,12 @@ class Compositor:
         )
 
     def compose(
-        self, images: Sequence[np.ndarray], out: np.ndarray, *, are_live: bool = True
+        self,
+        images: Sequence[np.ndarray],
+        out: np.ndarray,
+        *,
+        are_live: bool = True,
+        economical: bool = False,
     ) -> None:
         """Draw a panorama.
 
@@ -86,7 +92,10 @@ class Compositor:
         out
             (surface.height, surface.width[, channels]) uint8, overwritten.
         are_live
-            Whether the brightness of the pictures tells anything of the cameras now.
+            Whether the pictures tell anything of the cameras now: their brightness does not count
+            otherwise, and they only fade.
+        economical
+            Leave out what takes long in blends.
 
         Raises
         ------
@@ -102,7 +111,7 @@ class Compositor:
         share([partial(self._draw, parts, images, out, gain) for parts in self._parts])
         for fade in self._fades:
             if not fade.is_local:
-                fade.blend(_ALL_ROWS, out)
+                fade.blend(_ALL_ROWS, out, economical=economical or not are_live)
 
     def _prepare(self, placed: Placed, parts: list['_Part'], rows: slice) -> None:
         """Cut the tables of some rows: each view after its left neighbour, over which it fades."""

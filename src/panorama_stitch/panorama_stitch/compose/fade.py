@@ -1,12 +1,13 @@
 """Fades: the columns in which two views are drawn, one over the other, and then blended."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from panorama_stitch.compose.blend import Blend
 from panorama_stitch.compose.layout import Layout, Seam, shared, wrapped
 from panorama_stitch.compose.placing import PlacedView
+
+_MOST_OVERLAP_RAD = np.radians(40.0)
+"""Columns beside a seam that a blend may ask for: more cost time and gain little."""
 
 
 class Fade:
@@ -15,8 +16,8 @@ class Fade:
     Attributes
     ----------
     begin, end
-        Columns that both views draw: those of the seam, and where one of them shows the robot
-        itself, those in which the other can stand in.
+        Columns that both views draw: those of the seam, those beside it that the blend needs, and
+        where one of them shows the robot itself, those in which the other can stand in.
     """
 
     def __init__(
@@ -24,9 +25,9 @@ class Fade:
         layout: Layout,
         seam: Seam,
         pair: tuple[PlacedView, PlacedView, int],
-        blend: Callable[..., Blend],
+        blend: type[Blend],
     ):
-        self.begin, self.end = _strip(layout, seam, pair)
+        self.begin, self.end = _strip(layout, seam, pair, blend.needs_overlap)
         self._pieces = _pieces(self.begin, self.end, layout.surface.width)
         self._left = np.empty(0, np.uint8)
         self._right = np.empty(0, np.uint8)
@@ -58,17 +59,18 @@ class Fade:
         """Whether some rows can be blended while others are not drawn yet."""
         return self._blend is not None and self._blend.is_local
 
-    def blend(self, rows: slice, out: np.ndarray) -> None:
-        """Blend some rows of the views."""
+    def blend(self, rows: slice, out: np.ndarray, *, economical: bool = False) -> None:
+        """Blend some rows of the views, without what takes long if `economical`."""
         if not self._blend:
             return
         if len(self._pieces) == 1:
-            self._blend(self._left[rows], out[rows, self._pieces[0][0]], rows)
+            right = out[rows, self._pieces[0][0]]
+            self._blend(self._left[rows], right, rows, economical=economical)
             return
         # A seam across the panorama's edge is blended in one piece.
         for there, here in self._pieces:
             self._right[rows, here] = out[rows, there]
-        self._blend(self._left[rows], self._right[rows], rows)
+        self._blend(self._left[rows], self._right[rows], rows, economical=economical)
         for there, here in self._pieces:
             out[rows, there] = self._right[rows, here]
 
@@ -82,34 +84,46 @@ def _pieces(begin: int, end: int, width: int) -> list[tuple[slice, slice]]:
     return pieces
 
 
-def _strip(layout: Layout, seam: Seam, pair) -> tuple[int, int]:
+def _strip(layout: Layout, seam: Seam, pair, needs_overlap: bool) -> tuple[int, int]:
     """Columns in which both views are needed."""
-    left, right, turn_px = pair
-    if left.body is None and right.body is None:
+    left, right, _ = pair
+    if left.body is None and right.body is None and not needs_overlap:
         return seam
-    x = layout.origin[0]
-    begin, end = (edge - x for edge in shared(left, right, turn_px))
-    if not layout.wraps:
-        begin, end = max(begin, 0), min(end, layout.surface.width)
-    # Other seams keep their columns.
-    at = layout.seams.index(seam)
-    if at or layout.wraps:
-        around = 0 if at else layout.surface.width
-        begin = max(begin, layout.seams[at - 1].end - around)
-    if at + 1 < len(layout.seams) or layout.wraps:
-        following = (at + 1) % len(layout.seams)
-        around = 0 if following else layout.surface.width
-        end = min(end, layout.seams[following].begin + around)
+    begin, end = _room(layout, seam, pair, is_shared=needs_overlap)
     if end <= begin:
         return seam
-    height = layout.surface.height
-    rows = slice(layout.origin[1], layout.origin[1] + height)
-    hidden = left.shows_body(rows, slice(begin + x, end + x)).any(axis=0)
-    hidden |= right.shows_body(rows, slice(begin + x - turn_px, end + x - turn_px)).any(axis=0)
-    columns = begin + np.flatnonzero(hidden)
-    if not len(columns):
-        return seam
-    return min(seam.begin, int(columns[0])), max(seam.end, int(columns[-1]) + 1)
+    columns = _hidden(layout, (begin, end), pair)
+    if needs_overlap:
+        most = round(_MOST_OVERLAP_RAD * layout.surface.focal_px / 2)
+        columns = [*columns, max(begin, seam.begin - most), min(end, seam.end + most) - 1]
+    return min([seam.begin, *columns]), max([seam.end, *(column + 1 for column in columns)])
+
+
+def _room(layout: Layout, seam: Seam, pair, *, is_shared: bool) -> tuple[int, int]:
+    """Columns that both views show and no other seam needs; shared with them half and half."""
+    x, width = layout.origin[0], layout.surface.width
+    begin, end = (edge - x for edge in shared(*pair))
+    if not layout.wraps:
+        begin, end = max(begin, 0), min(end, width)
+    at = layout.seams.index(seam)
+    if at or layout.wraps:
+        edge = layout.seams[at - 1].end - (0 if at else width)
+        begin = max(begin, (edge + seam.begin) // 2 if is_shared else edge)
+    if at + 1 < len(layout.seams) or layout.wraps:
+        following = (at + 1) % len(layout.seams)
+        edge = layout.seams[following].begin + (0 if following else width)
+        end = min(end, (edge + seam.end) // 2 if is_shared else edge)
+    return begin, end
+
+
+def _hidden(layout: Layout, columns: tuple[int, int], pair) -> list[int]:
+    """Those columns in which a view shows the robot itself."""
+    (left, right, turn_px), (x, y) = pair, layout.origin
+    begin, end = (edge + x for edge in columns)
+    rows = slice(y, y + layout.surface.height)
+    hidden = left.shows_body(rows, slice(begin, end)).any(axis=0)
+    hidden |= right.shows_body(rows, slice(begin - turn_px, end - turn_px)).any(axis=0)
+    return [columns[0] + int(column) for column in np.flatnonzero(hidden)]
 
 
 def _seen(layout: Layout, strip: tuple[int, int], pair) -> list[np.ndarray]:

@@ -1,0 +1,191 @@
+"""Flow: near things, which two cameras see in two places, made whole in the overlap.
+
+From its left edge, where the picture is the left camera's, to its right edge the overlap is seen
+from a place that wanders from the left camera to the right one: each view is warped along the
+optical flow between them by its share (S. E. Chen, L. Williams, "View interpolation for image
+synthesis", 1993, https://doi.org/10.1145/166117.166153). In the middle both show the same, and one
+fades into the other.
+"""
+
+import cv2
+import numpy as np
+
+from panorama_stitch.compose.blend import Feather
+from panorama_stitch.compose.optical_flow import OpticalFlow
+from panorama_stitch.compose.parallel import share
+
+_ROUNDS = 3
+"""Of the fixed point that finds what part of a view comes to lie at a pixel."""
+_LEAST_TRUST, _FULL_TRUST = 0.25, 0.4
+"""Shares of a band of rows in which flows agree: with less they are wrong all over it."""
+_BAND_SHARE = 0.3
+"""Height of a band in units of the strip's."""
+_TRUST_PER_FRAME = 0.1
+"""Share of the way to its new value that the trust in a band goes at once."""
+_EDGE_SIDE = 5
+_EDGE_ROWS = 15
+"""Over so many reduced rows the edges of an overlap are evened out."""
+
+
+class Flow:
+    """Warps two views until they meet, and fades from one into the other.
+
+    What can be seen by one camera only has no flow. Where that is most of a band of rows, as with
+    things nearer than a few times the distance between the lenses, flow is wrong all over it: the
+    views fade unwarped. Trust in a band changes slowly, so that nothing flickers.
+    """
+
+    is_local, needs_overlap = False, True
+
+    def __init__(
+        self,
+        left_seen: np.ndarray,
+        right_seen: np.ndarray,
+        fade: tuple[int, int] | None = None,
+    ):
+        """Prepare; parameters as of `Feather`, the views warp in all columns."""
+        height, width = shape = left_seen.shape
+        fade = fade or (0, width)
+        self._feather = Feather(left_seen, right_seen, fade)
+        self._left_alone = (left_seen & ~right_seen).astype(np.uint8)
+        self._right_alone = (right_seen & ~left_seen).astype(np.uint8)
+        self._fade = slice(*fade)
+        ramp = (np.arange(fade[1] - fade[0], dtype=np.float32) + 0.5) / max(1, fade[1] - fade[0])
+        self._weights = [np.tile(weight, (height, 1)) for weight in (1 - ramp, ramp)]
+
+        self._flow = flow = OpticalFlow(width, height)
+        both = flow.reduced((left_seen & right_seen).astype(np.float32))
+        way = np.zeros_like(flow.grid)
+        way[flow.inner] = _way(both[flow.inner] > 0.5)[..., None]
+        self._left = _Warp(flow, way, shape, slice(0, fade[1]))
+        self._right = _Warp(flow, 1 - way, shape, slice(fade[0], width))
+        # What one view does not show must not be drawn to where both show something.
+        inside = cv2.erode(both, np.ones((_EDGE_SIDE, _EDGE_SIDE)))
+        inside = cv2.blur(inside, (_EDGE_SIDE, _EDGE_SIDE))
+        self._strength = cv2.merge([inside, inside])
+        self._used = np.empty_like(self._strength)
+        self._judged = (both > 0.5).astype(np.uint8)
+        self._band = 1, max(1, round(_BAND_SHARE * len(both[flow.inner]))) | 1
+        self._area = np.maximum(self._over_band(self._judged[flow.inner]), 1e-3)
+        self._agrees = np.empty_like(self._judged)
+        self._trust: np.ndarray | None = None
+
+    def __call__(
+        self,
+        left: np.ndarray,
+        right: np.ndarray,
+        rows: slice = slice(None),
+        *,
+        economical: bool = False,
+    ) -> None:
+        """As `Blend`."""
+        if economical:
+            # It fades in again, with the trust.
+            self._trust = np.zeros_like(self._area)
+            self._feather(left, right)
+            return
+        # Where one is alone the views do not differ.
+        cv2.copyTo(left, self._left_alone, right)
+        cv2.copyTo(right, self._right_alone, left)
+        self._flow.follow(left, right)
+        strength = self._used
+        np.copyto(strength, self._gate())
+        strength *= self._strength
+        ours, theirs = self._left, self._right
+        there, back = self._flow.flows
+        share(
+            [
+                lambda: ours.draw(left, there, strength),
+                lambda: theirs.draw(right, back, strength),
+            ]
+        )
+        fade, width = self._fade, self._fade.stop - self._fade.start
+        right[:, : fade.start] = ours.drawn[:, : fade.start]
+        right[:, fade.stop :] = theirs.drawn[:, width:]
+        if width:
+            faded = ours.drawn[:, fade], theirs.drawn[:, :width]
+            cv2.blendLinear(*faded, *self._weights, dst=right[:, fade])
+
+    def _gate(self) -> np.ndarray:
+        """(height, 1, 1): how far the flow of each row is used."""
+        self._flow.agrees(self._agrees)
+        self._agrees &= self._judged
+        agreeing = self._over_band(self._agrees[self._flow.inner]) / self._area
+        if self._trust is None:
+            self._trust = agreeing
+        self._trust += _TRUST_PER_FRAME * (agreeing - self._trust)
+        gate = (self._trust - _LEAST_TRUST) / (_FULL_TRUST - _LEAST_TRUST)
+        rows = self._flow.inner[0]
+        border = (rows.start, self._flow.height - rows.stop), (0, 0)
+        return np.pad(gate.clip(0, 1), border, 'edge')[..., None]
+
+    def _over_band(self, where: np.ndarray) -> np.ndarray:
+        """(rows, 1) share of the pixels around each row that are 1."""
+        shares = cv2.reduce(where, 1, cv2.REDUCE_AVG, dtype=cv2.CV_32F)
+        return cv2.blur(shares, self._band).reshape(shares.shape)
+
+
+def _way(both: np.ndarray) -> np.ndarray:
+    """How far on the way from the left camera to the right one each pixel is seen from, 0 to 1.
+
+    In each row it leads from the first pixel to the last one that both show.
+    """
+    height, width = both.shape
+    rows = np.flatnonzero(both.any(axis=1))
+    if not len(rows):
+        return np.zeros(both.shape, np.float32)
+    first, last = both.argmax(axis=1), width - both[:, ::-1].argmax(axis=1)
+    edges = []
+    for edge in (first, last):
+        edge = np.interp(np.arange(height), rows, edge[rows]).astype(np.float32)
+        edges.append(cv2.blur(edge[:, None], (1, _EDGE_ROWS)).reshape(height, 1))
+    begin, end = edges
+    columns = np.arange(width, dtype=np.float32) + 0.5
+    return ((columns - begin) / np.maximum(end - begin, 1)).clip(0, 1)
+
+
+class _Warp:
+    """Draws one view from between the cameras.
+
+    Attributes
+    ----------
+    drawn : ndarray
+        The columns that were asked for.
+    """
+
+    def __init__(
+        self, flow: OpticalFlow, part: np.ndarray, shape: tuple[int, int], columns: slice
+    ):
+        """Prepare for a `part` (flow.height, flow.width, 2) of the way to the other view."""
+        self.drawn = np.empty(0, np.uint8)
+        self._flow = flow
+        self._back = -part
+        self._columns = columns
+        self._at, self._moved = np.empty_like(flow.grid), np.empty_like(flow.grid)
+        height, width = shape
+        inner_height, inner_width = flow.grid[flow.inner].shape[:2]
+        self._scale = self._back * np.float32([width / inner_width, height / inner_height])
+        sides = np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32)
+        self._grid = np.dstack(np.meshgrid(*sides))
+        self._map = np.empty_like(self._grid)
+
+    def draw(self, image: np.ndarray, flow: np.ndarray, strength: np.ndarray) -> None:
+        """Draw a view, moved by its part of the flow from it, as far as strength (0 to 1) says."""
+        moved = flow
+        for _ in range(_ROUNDS):
+            np.multiply(self._back, moved, out=self._at)
+            self._at += self._flow.grid
+            self._flow.sample(flow, self._at, self._moved)
+            moved = self._moved
+        moved *= self._scale
+        moved *= strength
+        inner = moved[self._flow.inner]
+        size = self._map.shape[1::-1]
+        cv2.resize(inner, size, dst=self._map, interpolation=cv2.INTER_LINEAR)
+        where = self._map[:, self._columns]
+        cv2.add(where, self._grid[:, self._columns], dst=where)
+        shape = where.shape[:2] + image.shape[2:]
+        if self.drawn.shape != shape:
+            self.drawn = np.empty(shape, np.uint8)
+        border = {'borderMode': cv2.BORDER_REPLICATE}
+        cv2.remap(image, where, None, cv2.INTER_LINEAR, dst=self.drawn, **border)
