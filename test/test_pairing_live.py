@@ -7,8 +7,12 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray
 from fisheye_msgs.msg import Projection
 from free_running import Camera
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.msg import ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters
 from rig import SIDES, wait_for
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
@@ -32,8 +36,9 @@ ENCODINGS = {'left': 'mono8', 'right': 'bgr8'}
 class Publisher:
     """Two cameras whose corrected pictures come as they are due, from a thread."""
 
-    def __init__(self, node, cameras):
+    def __init__(self, node, cameras, right_ahead_s=0.0):
         self._node, self._cameras = node, cameras
+        self._ahead_ns = {'left': 0, 'right': round(right_ahead_s * 1e9)}
         self._end = threading.Event()
         self.sent_ns = {side: [] for side in SIDES}
         self._images, self._buffers = {}, {}
@@ -71,7 +76,7 @@ class Publisher:
             if self._end.wait(max(0.0, (stamp_ns - time.time_ns()) / 1e9)):
                 return
             message = self._buffers[side].message
-            message.header.stamp = stamp_of(stamp_ns)
+            message.header.stamp = stamp_of(stamp_ns + self._ahead_ns[side])
             self._images[side].publish(message)
             self.sent_ns[side].append(stamp_ns)
 
@@ -99,3 +104,34 @@ def test_the_slower_camera_sets_the_rate(rig, watcher, rates_hz, phase):
     assert len(came) >= due * (1 - SCHEDULING)
     assert np.median(np.diff(came)) == pytest.approx(period_ns, rel=0.25)
     assert watcher.newest.encoding == 'bgr8', 'colour beside grey'
+
+
+def test_clocks_that_differ_are_told_with_the_remedy_which_works(rig, watcher):
+    told = []
+    watcher.node.create_subscription(
+        DiagnosticArray, '/diagnostics', lambda m: told.append(m.status[0]), 10
+    )
+    client = watcher.node.create_client(SetParameters, 'stitch/set_parameters')
+    rig.start('stitch', auto_calibrate=False)
+    cameras = Camera(30, 0.0, 1.0), Camera(30, 12.0, 1.0)
+
+    def says(words):
+        return rig.check_alive() or any(words in status.message for status in told[-1:])
+
+    with Publisher(watcher.node, cameras, right_ahead_s=-37.0).running():
+        wait_for(lambda: says('pair_by:=arrival'), START_S, 'the sentence about clocks')
+        assert 'the stamps of the cameras are 37 s apart' in told[-1].message
+        assert not any('shed' in status.message for status in told), 'the machine is not blamed'
+        assert watcher.newest is None
+        value = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value='arrival')
+        asked = client.call_async(
+            SetParameters.Request(parameters=[ParameterMessage(name='pair_by', value=value)])
+        )
+        wait_for(asked.done, START_S, 'an answer')
+        assert asked.result().results[0].successful
+        wait_for(lambda: len(watcher.stamps_ns) > SETTLED, START_S, 'panoramas')
+        told.clear()
+        wait_for(lambda: len(told) > 1, START_S, 'diagnostics')
+    values = {entry.key: entry.value for entry in told[-1].values}
+    assert values['latency'] == "not known: the stamps are 37 s behind this machine's clock"
+    assert 'latency p50 ms' not in values

@@ -1,5 +1,6 @@
 """The live line: pairs become panoramas, a silent camera is shown as such, and all comes back."""
 
+import gc
 import threading
 import time
 from dataclasses import replace
@@ -11,7 +12,8 @@ import pytest
 from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.errors import CameraFileError, ImageFormatError, OverlapError
-from fisheye_geometry.remap import Turn
+from fisheye_geometry.remap import RemapTable, Turn
+from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.figures import unpaired
 from panorama_stitch.live import LiveStitcher
 from panorama_stitch.settings import PanoramaSettings
@@ -21,6 +23,8 @@ YAW = np.radians(140)
 SETTINGS = PanoramaSettings(stale_after_s=0.2)
 DEADLINE_S = 20.0
 STEP_NS = 33_000_000
+TABLES = 3
+"""A compositor needs at most so many for each camera: drawing, seams, gain."""
 
 
 @pytest.fixture(scope='module')
@@ -341,3 +345,20 @@ def test_a_setting_that_changes_while_an_overlap_is_sought_need_not_wait(make_li
     begin = time.monotonic()
     line.feed(dark, is_measuring.is_set, 'the next search')
     assert time.monotonic() - begin < 2.0, 'the pause between two searches'
+
+
+def test_what_was_made_for_former_settings_is_let_go(make_line, pictures):
+    line = make_line()
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    for hfov_deg in range(140, 152):
+        settings, count = replace(SETTINGS, hfov_deg=float(hfov_deg)), len(line.changed)
+        line.live.apply(settings)
+        for camera in settings.cameras:
+            line.live.place(camera, LENS, settings.surface_of(LENS))
+        line.feed(pictures, lambda seen=count: len(line.changed) > seen, 'another compositor')
+    gc.collect()
+    alive = [type(thing) for thing in gc.get_objects()]
+    lines = 1 + alive.count(Line)
+    assert alive.count(Compositor) <= 2 * lines, 'the one in use, and the one being made'
+    tables = 4 + 2 * lines * len(SETTINGS.cameras) * TABLES
+    assert alive.count(RemapTable) <= tables
