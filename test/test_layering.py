@@ -48,6 +48,7 @@ KEYS = {
     'aiohttp': 'python3-aiohttp',
     'matplotlib': 'python3-matplotlib',
     'ament_index_python': 'ament_index_python',
+    'av': 'python3-av',
 }
 SHARED_SHELL = 'panorama_stitch.base_node'
 """The one node module that others build on: what stitch_node and panorama_node share."""

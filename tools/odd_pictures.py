@@ -13,6 +13,14 @@ def turned(jpeg: bytes) -> bytes:
     return jpeg[:2] + segment + jpeg[2:]
 
 
+def turned_video(mp4: bytes) -> bytes:
+    """Return an MP4 of the same pixels whose track header says that the camera was on its side."""
+    # ISO/IEC 14496-12, 8.3.2: the matrix, in 16.16 and 2.30, lies 44 bytes behind the box's name.
+    at = mp4.index(b'tkhd') + 44
+    matrix = struct.pack('>9i', 0, 1 << 16, 0, -1 << 16, 0, 0, 0, 0, 1 << 30)
+    return mp4[:at] + matrix + mp4[at + len(matrix) :]
+
+
 def huge_png(side_px: int = 60_000) -> bytes:
     """Give a PNG of a few bytes that claims to be larger than memory."""
 

@@ -116,6 +116,8 @@ class CaptureNode(Node):
             report.add(ERROR, grabber.complaint)
         if grabber.note:
             report.add(WARN, grabber.note)
+        if damage := grabber.damage():
+            report.add(WARN, damage)
         if self._fault:
             report.add(ERROR if self._camera else WARN, self._fault)
         report.values['source'] = shown_source(self._settings.source)
@@ -125,6 +127,7 @@ class CaptureNode(Node):
         skipped = grabber.skipped + dropped
         self._shedding.tell(report, grabber.frames - dropped, skipped)
         report.values['pictures skipped'] = skipped
+        report.values['pictures damaged'] = grabber.damaged
         self._broken.tell(report)
 
 

@@ -63,6 +63,8 @@ def video_pictures(path: Path, loop: bool) -> Iterator[tuple[str, np.ndarray]]:
     """Give the frames of a video; a `SourceError` if it has none."""
     while True:
         video = cv2.VideoCapture(str(path))
+        # A calibration knows nothing of a turned picture.
+        video.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0)
         frames = 0
         while (image := video.read()[1]) is not None:
             frames += 1

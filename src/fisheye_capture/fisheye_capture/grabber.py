@@ -62,7 +62,7 @@ class Grabber:
         self._stopping = Event()
         self._thread = Thread(target=self._run, name=f'grab {settings.camera_name}', daemon=True)
         self.reason = 'waiting for the first picture'
-        self.attempts = self.frames = 0
+        self.attempts = self.frames = self._told_damaged = 0
         self._source: Source | None = None
         try:
             self._source = open_source(settings)
@@ -93,6 +93,23 @@ class Grabber:
         """Frames of the open source that were due while the one before was still in work."""
         source = self._source
         return source.skipped if source else 0
+
+    @property
+    def damaged(self) -> int:
+        """Frames of the open source that came damaged and were not given."""
+        source = self._source
+        return source.damaged if source else 0
+
+    def damage(self) -> str:
+        """Return what came damaged since this was last asked, in a sentence; '' for nothing."""
+        damaged, former = self.damaged, self._told_damaged
+        self._told_damaged = damaged
+        if damaged <= former:
+            return ''
+        return (
+            f'{damaged - former} pictures came damaged and were dropped, each with those that are '
+            'drawn upon it; is the link good enough?'
+        )
 
     def start(self) -> None:
         """Begin to read."""

@@ -1,9 +1,11 @@
-"""Cameras read through OpenCV: a device here; in a process of its own, a network stream."""
+"""Cameras of this machine, read through OpenCV."""
 
 import os
+import stat
 import time
 
 import cv2
+import numpy as np
 
 from fisheye_capture.settings import CaptureSettings
 from fisheye_capture.source import (
@@ -17,69 +19,46 @@ from fisheye_geometry.coded_picture import size_of, whole_jpeg
 from fisheye_geometry.encodings import from_opencv
 from fisheye_geometry.errors import ImageFormatError, SourceError
 
-_BROKEN_IN_A_ROW = 10
+BROKEN_IN_A_ROW = 10
 """So many broken pictures one after the other are a broken camera."""
 _PATIENCE_S = 4.0
 """A device may take this long to give its first picture, or to go on after a hiccup."""
 _BUFFERS = 2
 """One that is read and one that fills; with one alone, drivers lose every other picture."""
 _SELECT_TIMEOUT_S = 1
+_NS_PER_MS = 1_000_000
+_VIDEO4LINUX = 81
+"""Major number of its devices."""
 # How long OpenCV waits for a picture of a device; it looks when it waits for the first time.
 os.environ.setdefault('OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT', str(_SELECT_TIMEOUT_S))
 
 
-class LiveSource(Source):
-    """What an opened `cv2.VideoCapture` gives, each picture stamped when it was there."""
-
-    def __init__(self, name: str, capture: cv2.VideoCapture, encoding: str):
-        self._name = name
-        self._capture = capture
-        self._encoding = encoding
-        self._size = None
-
-    def read(self) -> Frame | JpegFrame:
-        """Wait for the next frame; skips a few broken ones."""
-        for _ in range(_BROKEN_IN_A_ROW):
-            self._grab()
-            stamp_ns = time.time_ns()
-            image = self._retrieve()
-            frame = None if image is None else self._frame(stamp_ns, image)
-            if frame is not None:
-                return self._checked(frame)
-        raise SourceLostError(f'{self._name} gives only broken pictures')
-
-    def close(self) -> None:
-        """Release the camera."""
-        self._capture.release()
-
-    def _grab(self):
-        if not self._capture.grab():
-            raise SourceLostError(f'{self._name} gives no more pictures')
-
-    def _retrieve(self):
-        try:
-            is_whole, image = self._capture.retrieve()
-        except cv2.error:
-            return None
-        return image if is_whole and image is not None and image.size else None
-
-    def _frame(self, stamp_ns, image):
-        """Make a frame of what OpenCV gave; None if it is broken."""
-        return Frame(stamp_ns, from_opencv(image, self._encoding))
-
-    def _checked(self, frame):
-        """Refuse a picture of another size: the calibration holds for one only."""
-        self._size = self._size or frame.size
-        if frame.size != self._size:
-            raise SourceLostError(
-                '{} changed its size from {}x{} px to {}x{} px'.format(
-                    self._name, *self._size, *frame.size
-                )
-            )
-        return frame
+def jpeg_frame(stamp_ns: int, data: np.ndarray, encoding: str) -> JpegFrame | None:
+    """Return the frame that a camera coded itself, data (n,) uint8; None if it is torn."""
+    jpeg = whole_jpeg(data)
+    if jpeg is None:
+        return None
+    try:
+        return JpegFrame(stamp_ns, jpeg, size_of(jpeg), encoding)
+    except ImageFormatError:
+        return None
 
 
-class DeviceSource(LiveSource):
+def check_size(name: str, expected: tuple[int, int] | None, size: tuple[int, int]) -> None:
+    """Refuse a picture of another size than those before: the calibration holds for one only.
+
+    Raises
+    ------
+    SourceLostError
+        If it has another.
+    """
+    if expected not in (None, size):
+        raise SourceLostError(
+            '{} changed its size from {}x{} px to {}x{} px'.format(name, *expected, *size)
+        )
+
+
+class DeviceSource(Source):
     """A camera of this machine, through Video4Linux."""
 
     def __init__(self, settings: CaptureSettings):
@@ -93,12 +72,34 @@ class DeviceSource(LiveSource):
             raise SourceLostError(f'there is no device {path}')
         if not os.access(path, os.R_OK | os.W_OK):
             raise SourceLostError(f'{path} may not be opened; is the user in the group video?')
+        device = os.stat(path)
+        if stat.S_ISCHR(device.st_mode) and os.major(device.st_rdev) != _VIDEO4LINUX:
+            raise SourceError(f'{path} is no camera; expected a Video4Linux device')
         capture = cv2.VideoCapture(path, cv2.CAP_V4L2)
         if not capture.isOpened():
             raise SourceLostError(f'{path} cannot be opened; is it a camera, and free?')
-        super().__init__(path, capture, settings.encoding)
+        self._name, self._capture, self._encoding = path, capture, settings.encoding
+        self._delay_ns = round(settings.delay_ms * _NS_PER_MS)
+        self._size = None
         self._interrupted = False
         self.note = self._set_up(settings)
+
+    def read(self) -> Frame | JpegFrame:
+        """Wait for the next frame; skips a few broken ones."""
+        for _ in range(BROKEN_IN_A_ROW):
+            self._grab()
+            stamp_ns = time.time_ns() - self._delay_ns
+            frame = self._retrieve(stamp_ns)
+            if frame is not None:
+                check_size(self._name, self._size, frame.size)
+                self._size = frame.size
+                return frame
+            self.damaged += 1
+        raise SourceLostError(f'{self._name} gives only broken pictures')
+
+    def close(self) -> None:
+        """Release the camera."""
+        self._capture.release()
 
     def interrupt(self) -> None:
         """End a wait within `_SELECT_TIMEOUT_S`."""
@@ -133,17 +134,17 @@ class DeviceSource(LiveSource):
             capture.set(cv2.CAP_PROP_CONVERT_RGB, 0)
         return f'{self._name} gives ' + ', '.join(differing) if differing else ''
 
-    def _frame(self, stamp_ns, image):
-        is_coded = image.ndim == 2 and image.shape[0] == 1
-        if not is_coded:
-            return super()._frame(stamp_ns, image)
-        jpeg = whole_jpeg(image[0])
-        if jpeg is None:
-            return None
+    def _retrieve(self, stamp_ns):
+        """Make a frame of what was grabbed; None if it is broken."""
         try:
-            return JpegFrame(stamp_ns, jpeg, size_of(jpeg), self._encoding)
-        except ImageFormatError:
+            is_whole, image = self._capture.retrieve()
+        except cv2.error:
             return None
+        if not is_whole or image is None or not image.size:
+            return None
+        if image.ndim == 2 and image.shape[0] == 1:
+            return jpeg_frame(stamp_ns, image[0], self._encoding)
+        return Frame(stamp_ns, from_opencv(image, self._encoding))
 
     def _grab(self):
         deadline_s = time.monotonic() + _PATIENCE_S

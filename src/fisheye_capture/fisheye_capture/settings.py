@@ -37,6 +37,24 @@ class FrameSettings:
         minimum=0.1,
         maximum=3600.0,
     )
+    connect_timeout_s: float = setting(
+        10.0,
+        'How long a network camera may take to answer.',
+        minimum=0.5,
+        maximum=120.0,
+    )
+    silence_timeout_s: float = setting(
+        2.0,
+        'A network camera that sends nothing for so long, or for three periods, is opened anew.',
+        minimum=0.2,
+        maximum=120.0,
+    )
+    first_picture_timeout_s: float = setting(
+        30.0,
+        'How long a network camera may send before its first keyframe comes.',
+        minimum=1.0,
+        maximum=600.0,
+    )
     synthetic_fov_deg: float = setting(
         170.0,
         'Field of view of the synthetic camera across its picture.',
@@ -53,6 +71,24 @@ class CameraSettings:
         'synthetic',
         'synthetic, a device (0, /dev/video0), a picture, a folder or glob of pictures, a video, '
         'or an http, rtsp or udp URL; for panorama_node also topic: another node reads it.',
+    )
+    rtsp_transport: str = setting(
+        'tcp',
+        'How RTSP pictures come: tcp loses nothing, udp delays nothing.',
+        choices=('tcp', 'udp'),
+    )
+    stamp_from: str = setting(
+        'arrival',
+        "Stamps of a network camera: arrival, or camera, the camera's own clock as its RTCP "
+        'sender reports tell it; for cameras that are set by NTP.',
+        choices=('arrival', 'camera'),
+    )
+    delay_ms: float = setting(
+        0.0,
+        'What a device or network camera needs from taking a picture to its arrival; taken off '
+        'the stamps.',
+        minimum=0.0,
+        maximum=10000.0,
     )
     camera_info_url: str = setting(
         '',

@@ -72,11 +72,14 @@ class Source(ABC):
         What a user should know of how it was opened; '' for nothing.
     skipped
         Frames that were due while the one before was still in work.
+    damaged
+        Frames that came damaged and were not given.
     """
 
     camera: Camera | None = None
     note: str = ''
     skipped: int = 0
+    damaged: int = 0
 
     @abstractmethod
     def read(self) -> Frame | JpegFrame:
@@ -95,6 +98,19 @@ class Source(ABC):
         """Release what the source holds; no `read` may be under way."""
 
 
+CREDENTIALS = (
+    r'^(?P<scheme>[A-Za-z][\w+.-]*:/{1,3}|(?![A-Za-z][\w+.-]*:/))'
+    r'(?P<login>[^/@:?]*:.*|[^/@:?]*)@'
+)
+"""User and password at the start of a URL; a password may hold any letter, / and @ too."""
+_SECRETS = re.compile(
+    '((?:user|usr|login|account|pass|pwd|pw|token|key|auth|secret|session|sid|credential)'
+    r'[^=&?/;]{0,16}=)[^&;#/]*',
+    re.IGNORECASE,
+)
+"""Users and passwords further on in it: what stands behind such a word."""
+
+
 def shown_source(source: str) -> str:
-    """Give a source as others may read it: a URL without its user and password."""
-    return re.sub('://[^/]*@', '://', source)
+    """Return a source as others may read it: a URL without its user, password and tokens."""
+    return _SECRETS.sub(r'\1***', re.sub(CREDENTIALS, r'\g<scheme>', source, count=1))

@@ -11,14 +11,13 @@ from fisheye_capture.files import (
     video_pictures,
 )
 from fisheye_capture.live import DeviceSource
+from fisheye_capture.network_request import SCHEMES
 from fisheye_capture.settings import CaptureSettings
 from fisheye_capture.source import Source, shown_source
 from fisheye_capture.stream import StreamSource
 from fisheye_capture.synthetic import SyntheticSource
 from fisheye_geometry.errors import SourceError
 from fisheye_geometry.picture_file import is_picture, pictures_in
-
-_STREAMS = ('http', 'https', 'rtsp', 'rtsps', 'udp')
 
 
 def open_source(settings: CaptureSettings) -> Source:
@@ -37,17 +36,19 @@ def open_source(settings: CaptureSettings) -> Source:
     if re.fullmatch('[0-9]+|/dev/.+', source):
         return DeviceSource(settings)
     scheme, mark, rest = source.partition('://')
-    if mark and scheme in _STREAMS:
+    if mark and scheme.lower() in SCHEMES:
         return StreamSource(settings)
     if mark and scheme != 'file':
         raise SourceError(
             f"source '{shown_source(source)}' has the scheme '{scheme}'; expected one of "
-            f'{", ".join(_STREAMS)} or file'
+            f'{", ".join(SCHEMES)} or file'
         )
     return _open_files(settings, os.path.expanduser(rest if mark else source))
 
 
 def _open_files(settings: CaptureSettings, name: str) -> Source:
+    if os.path.exists(name) and not os.path.isfile(name) and not os.path.isdir(name):
+        raise SourceError(f'{name} is no regular file; expected a picture, a video or a folder')
     if os.path.isfile(name):
         if is_picture(name):
             return PictureSource(settings, Path(name))
@@ -56,6 +57,6 @@ def _open_files(settings: CaptureSettings, name: str) -> Source:
     if pictures:
         return SequenceSource(settings, folder_pictures(pictures, settings.loop))
     raise SourceError(
-        f"source '{settings.source}' is not there; expected synthetic, a device, a picture, a "
-        'folder or glob of pictures, a video, or an http, rtsp or udp URL'
+        f"source '{shown_source(settings.source)}' is not there; expected synthetic, a device, "
+        'a picture, a folder or glob of pictures, a video, or an http, rtsp or udp URL'
     )

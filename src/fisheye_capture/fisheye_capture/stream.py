@@ -4,59 +4,70 @@ FFmpeg cannot be interrupted while it waits for a camera, and it decodes what co
 a process can be ended at any moment and harms nobody if it fails.
 """
 
+import importlib.util
+import math
 import os
-import struct
+import socket
 import subprocess
 import sys
+from contextlib import suppress
+from dataclasses import asdict
 
-import numpy as np
-
+from fisheye_capture.live import BROKEN_IN_A_ROW, check_size, jpeg_frame
+from fisheye_capture.network_request import StreamRequest
 from fisheye_capture.settings import CaptureSettings
-from fisheye_capture.source import Frame, Source, SourceLostError
+from fisheye_capture.shared_frames import SlotPool, receive, send
+from fisheye_capture.source import Frame, JpegFrame, Source, SourceLostError, shown_source
+from fisheye_geometry.errors import ImageFormatError, SourceError
 
-HEADER = struct.Struct('=qIII')
-"""Stamp in ns, rows, columns, channels; pixels follow. 0 rows: the end, why in columns bytes."""
-_ENVIRONMENT = {
-    'OPENCV_FFMPEG_CAPTURE_OPTIONS': 'rtsp_transport;tcp|fflags;nobuffer|flags;low_delay',
-    'OPENCV_FFMPEG_LOGLEVEL': '-8',
-    'OPENCV_LOG_LEVEL': 'SILENT',
-}
-"""Newest picture first, and no word from the libraries; what the user set goes before."""
+_NS_PER_MS = 1_000_000
 
 
 class StreamSource(Source):
-    """An http, rtsp or udp stream."""
+    """An http, https, rtsp, rtsps or udp camera."""
 
     def __init__(self, settings: CaptureSettings):
-        # Not as arguments: they are for everybody to see, and a URL may hold a password.
-        lines = settings.source, settings.encoding, str(settings.frame_rate_hz)
-        try:
-            self._process = subprocess.Popen(
-                [sys.executable, '-m', 'fisheye_capture.stream_reader'],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                env={**_ENVIRONMENT, **os.environ, 'PYTHONPATH': os.pathsep.join(sys.path)},
-                # Ctrl-C is for this process, which ends that one.
-                start_new_session=True,
+        if importlib.util.find_spec('av') is None:
+            raise SourceError(
+                'network cameras are read with PyAV, which is missing here: sudo apt install '
+                'python3-av, or pip install av'
             )
-            with self._process.stdin as pipe:
-                pipe.write('\n'.join(lines).encode())
+        self._name, self._encoding = shown_source(settings.source), settings.encoding
+        self._delay_ns = round(settings.delay_ms * _NS_PER_MS)
+        self._pool, self._size, self._last_ns, self._torn = SlotPool(), None, 0, 0
+        self._channel, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        try:
+            with theirs:
+                self._process = subprocess.Popen(
+                    [sys.executable, '-m', 'fisheye_capture.stream_reader', str(theirs.fileno())],
+                    stdin=subprocess.DEVNULL,
+                    pass_fds=[theirs.fileno()],
+                    env={**os.environ, 'PYTHONPATH': os.pathsep.join(sys.path)},
+                    # Ctrl-C is for this process, which ends that one.
+                    start_new_session=True,
+                )
         except OSError as error:
+            self._channel.close()
             raise SourceLostError(f'no process can read the stream: {error.strerror}') from error
+        # Not as arguments: they are for everybody to see, and a URL may hold a password.
+        send(self._channel, asdict(StreamRequest.of(settings)))
 
-    def read(self) -> Frame:
-        """Wait for the next frame."""
-        header = bytearray(HEADER.size)
-        self._fill(header)
-        stamp_ns, rows, columns, channels = HEADER.unpack(header)
-        if not rows:
-            reason = bytearray(columns)
-            self._fill(reason)
-            raise SourceLostError(reason.decode())
-        shape = (rows, columns) if channels == 1 else (rows, columns, channels)
-        image = np.empty(shape, np.uint8)
-        self._fill(image)
-        return Frame(stamp_ns, image)
+    def read(self) -> Frame | JpegFrame:
+        """Wait for a picture that came after the one before; the newest if there are more."""
+        for _ in range(BROKEN_IN_A_ROW):
+            message, array = self._fetch()
+            # A sender report may set the camera's clock right, but no stamp goes back.
+            stamp_ns = max(message['stamp_ns'] - self._delay_ns, self._last_ns + 1)
+            frame = self._frame(stamp_ns, message['shape'], array)
+            self.skipped = message['skipped']
+            self.damaged = message['damaged'] + self._torn
+            self.note = message['note']
+            if frame is not None:
+                self._last_ns = stamp_ns
+                check_size(self._name, self._size, frame.size)
+                self._size = frame.size
+                return frame
+        raise SourceLostError(f'{self._name} gives only broken pictures')
 
     def interrupt(self) -> None:
         """End the process, and with it a read that waits."""
@@ -66,9 +77,35 @@ class StreamSource(Source):
         """End the process."""
         self._process.kill()
         self._process.wait()
-        self._process.stdout.close()
+        self._channel.close()
 
-    def _fill(self, buffer):
-        view = memoryview(buffer).cast('B')
-        if self._process.stdout.readinto(view) != len(view):
-            raise SourceLostError('the process that reads the stream ended')
+    def _fetch(self):
+        slot = self._pool.take()
+        with suppress(OSError):  # Why it ended is still to be read.
+            send(self._channel, {'slot': slot})
+        while True:
+            message, files = receive(self._channel)
+            if not message:
+                raise SourceLostError('the process that reads the stream ended')
+            if 'lost' in message:
+                raise SourceLostError(message['lost'])
+            if 'shape' in message:
+                return message, self._pool.array(slot, math.prod(message['shape']), files)
+            self.note = message['note']
+
+    def _frame(self, stamp_ns, shape, array):
+        """Make a frame of what came; None if it is torn, and counted as that."""
+        if len(shape) > 1:
+            return Frame(stamp_ns, array.reshape(shape))
+        frame = jpeg_frame(stamp_ns, array, self._encoding)
+        if frame is None:
+            self._torn += 1
+            return None
+        if self._encoding != 'mono8':
+            return frame
+        try:
+            # In grey its own JPEG would be another picture.
+            return Frame(stamp_ns, frame.image)
+        except ImageFormatError:
+            self._torn += 1
+            return None

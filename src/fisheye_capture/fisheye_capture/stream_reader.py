@@ -1,66 +1,69 @@
-"""The process that reads a network stream for a `StreamSource` and writes its frames to stdout."""
+"""The process that reads a network stream for a `StreamSource`: a picture for each request."""
 
 import os
+import socket
 import sys
+from contextlib import suppress
 
-import cv2
+import numpy as np
 
-from fisheye_capture.live import LiveSource
-from fisheye_capture.source import SourceLostError, shown_source
-from fisheye_capture.stream import HEADER
-from fisheye_geometry.errors import SourceError
+from fisheye_capture.network_address import StreamError
+from fisheye_capture.network_request import StreamRequest
+from fisheye_capture.shared_frames import Slots, receive, send
+from fisheye_capture.stream_camera import Picture, StreamCamera
 
-_OPEN_TIMEOUT_S = 10.0
-"""RTSP cameras take some seconds until the first picture that stands alone."""
-_READ_TIMEOUT_S = 2.0
-"""Silence for so long is a lost camera, unless it is a slow one."""
-_SLOW_PERIODS = 3
-
-
-def open_stream(url: str, encoding: str, frame_rate_hz: float) -> LiveSource:
-    """Open a stream through OpenCV's FFmpeg.
-
-    Raises
-    ------
-    SourceLostError
-        If nothing answers, or what answers is no stream.
-    """
-    name = shown_source(url)
-    read_timeout_s = max(_READ_TIMEOUT_S, _SLOW_PERIODS / frame_rate_hz)
-    limits = {
-        cv2.CAP_PROP_OPEN_TIMEOUT_MSEC: _OPEN_TIMEOUT_S,
-        cv2.CAP_PROP_READ_TIMEOUT_MSEC: read_timeout_s,
-    }
-    parameters = [number for prop, s in limits.items() for number in (prop, round(s * 1000))]
-    capture = cv2.VideoCapture(url, cv2.CAP_FFMPEG, parameters)
-    if not capture.isOpened():
-        raise SourceLostError(f'{name} cannot be opened; is it on, and the address right?')
-    return LiveSource(name, capture, encoding)
+_PIXELS = {'bgr8': 'bgr24', 'rgb8': 'rgb24', 'mono8': 'gray'}
+"""Names of encodings in FFmpeg."""
+_NOTE_S = 0.5
+"""How often it is looked whether there is something to say while no picture comes."""
 
 
 def main() -> None:
-    """Read what to open from stdin, then write a header and the pixels of each frame."""
-    url, encoding, frame_rate_hz = sys.stdin.read().split('\n')
-    # Nothing that a library prints may get between the frames.
-    pipe = os.fdopen(os.dup(sys.stdout.fileno()), 'wb')
-    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
-    try:
+    """Answer requests until nobody asks any more."""
+    channel = socket.socket(fileno=int(sys.argv[1]))
+    message, _ = receive(channel)
+    # The threads that wait for the camera cannot be ended: this process is.
+    with suppress(BrokenPipeError):
         try:
-            source = open_stream(url, encoding, float(frame_rate_hz))
-            while True:
-                frame = source.read()
-                image = frame.image
-                channels = 1 if image.ndim == 2 else image.shape[2]
-                pipe.write(HEADER.pack(frame.stamp_ns, *image.shape[:2], channels))
-                pipe.write(image)
-                pipe.flush()
-        except SourceError as error:
-            reason = str(error).encode()
-            pipe.write(HEADER.pack(0, 0, len(reason), 0) + reason)
-            pipe.flush()
-    except BrokenPipeError:
-        # Nobody wants the frames any more; what is left in the buffer cannot be written.
-        os._exit(0)
+            _serve(channel, StreamRequest(**message))
+        except StreamError as error:
+            send(channel, {'lost': str(error)})
+    os._exit(0)
+
+
+def _serve(channel, request):
+    camera, slots, note = StreamCamera(request), Slots(), ''
+    while message := receive(channel)[0]:
+        while (picture := camera.picture(_NOTE_S)) is None:
+            if camera.note != note:
+                note = camera.note
+                send(channel, {'note': note})
+        _answer(channel, slots, message['slot'], picture, request.encoding, camera)
+        note = camera.note
+
+
+def _answer(channel, slots, slot, picture: Picture, encoding, camera):
+    answer = {
+        'stamp_ns': picture.stamp_ns,
+        'damaged': camera.damaged,
+        'skipped': camera.skipped,
+        'note': camera.note,
+    }
+    if picture.jpeg is not None:
+        pixels, shape = np.frombuffer(picture.jpeg, np.uint8), [len(picture.jpeg)]
+        target, files = slots.fit(slot, pixels.size)
+        target[:] = pixels
+    else:
+        frame = picture.frame.reformat(format=_PIXELS[encoding])
+        channels = 1 if encoding == 'mono8' else 3
+        width, height, plane = frame.width, frame.height, frame.planes[0]
+        shape = [height, width] if channels == 1 else [height, width, channels]
+        target, files = slots.fit(slot, width * height * channels)
+        rows = np.frombuffer(plane, np.uint8).reshape(height, plane.line_size)
+        np.copyto(target.reshape(height, -1), rows[:, : width * channels])
+    send(channel, {**answer, 'shape': shape}, files)
+    for file in files:
+        os.close(file)
 
 
 if __name__ == '__main__':

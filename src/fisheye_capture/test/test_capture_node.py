@@ -194,8 +194,10 @@ def test_a_device_held_on_its_side_gives_pictures_as_its_sensor_does(
 
 
 def test_a_picture_that_cannot_be_decoded_is_dropped_and_counted(ros, jpeg_device, monkeypatch):
-    head_only = np.append(JpegDevice.picture[:200], JpegDevice.picture[-2:])
-    monkeypatch.setattr(JpegDevice, 'picture', head_only)
+    impossible = JpegDevice.picture.copy()
+    table = impossible.tobytes().index(b'\xff\xc4') + 5
+    impossible[table : table + 16] = 255  # More Huffman codes than there are bits for.
+    monkeypatch.setattr(JpegDevice, 'picture', impossible)
     ros.start(source=jpeg_device)
 
     def broken():

@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 import pytest
-from odd_pictures import huge_png
+from odd_pictures import huge_png, turned_video
 
 from fisheye_capture.source import SourceEndedError
 from fisheye_capture.sources import open_source
@@ -105,11 +105,31 @@ def test_a_file_that_is_no_picture_is_named(settings, tmp_path, name):
         open_source(settings(path))
 
 
-def test_a_picture_of_absurd_size_is_named(settings, tmp_path):
+@pytest.mark.parametrize('side_px', [30_000, 60_000])
+def test_a_picture_of_absurd_size_is_named(settings, tmp_path, side_px):
     path = tmp_path / 'huge.png'
-    path.write_bytes(huge_png())
-    with pytest.raises(SourceError, match=r'huge\.png is not a picture'):
+    path.write_bytes(huge_png(side_px))
+    with pytest.raises(SourceError, match=rf'huge\.png .* {side_px}x{side_px} px; expected up to'):
         open_source(settings(path))
+
+
+def test_a_file_of_absurd_size_is_named(settings, tmp_path):
+    path = tmp_path / 'huge.bmp'
+    with path.open('wb') as file:
+        file.truncate(10**12)
+    with pytest.raises(SourceError, match=r'huge\.bmp has 1000000 MB; expected a picture of up'):
+        open_source(settings(path))
+
+
+def test_a_video_is_not_turned_whatever_it_says(settings, tmp_path):
+    path = tmp_path / 'turned.mp4'
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*'mp4v'), 25, (64, 48))
+    for _ in range(3):
+        writer.write(np.full((48, 64, 3), 90, np.uint8))
+    writer.release()
+    path.write_bytes(turned_video(path.read_bytes()))
+    assert cv2.VideoCapture(str(path)).read()[1].shape == (64, 48, 3), 'others turn it'
+    assert open_source(settings(path)).read().image.shape == (48, 64, 3)
 
 
 def test_an_unreadable_picture_in_a_folder_is_named(settings, write_picture, tmp_path):

@@ -1,13 +1,14 @@
 """Devices, with OpenCV's capture replaced: none is at hand where tests run."""
 
 import itertools
+import time
 
 import cv2
 import numpy as np
 import pytest
 
 from fisheye_capture import live
-from fisheye_capture.live import DeviceSource, LiveSource
+from fisheye_capture.live import DeviceSource
 from fisheye_capture.source import SourceEndedError, SourceLostError
 from fisheye_geometry.errors import SourceError
 
@@ -121,23 +122,35 @@ def test_a_device_that_cannot_be_opened_may_come(settings, tmp_path):
     'broken',
     [(False, None), (True, None), (True, np.empty((0, 0, 3), np.uint8)), cv2.error('bad')],
 )
-def test_a_broken_picture_is_skipped(broken):
-    source = LiveSource('camera', Capture([broken, GOOD]), 'mono8')
-    assert source.read().image.shape == (24, 32)
+def test_a_broken_picture_is_skipped_and_counted(open_device, broken):
+    device = open_device(Capture([broken, GOOD]), encoding='mono8')
+    assert device.read().image.shape == (24, 32)
+    assert device.damaged == 1
 
 
-def test_only_broken_pictures_are_a_lost_camera():
-    source = LiveSource('camera', Capture(itertools.repeat((True, None))), 'bgr8')
-    with pytest.raises(SourceLostError, match='camera gives only broken pictures'):
-        source.read()
+def test_only_broken_pictures_are_a_lost_camera(open_device):
+    device = open_device(Capture(itertools.repeat((True, None))))
+    with pytest.raises(SourceLostError, match='video0 gives only broken pictures'):
+        device.read()
 
 
-def test_another_size_is_a_lost_camera():
+def test_what_the_camera_needs_is_taken_off_the_stamp(open_device):
+    before_ns = time.time_ns()
+    stamp_ns = open_device(Capture([GOOD]), delay_ms=5000.0).read().stamp_ns
+    assert before_ns - 5_000_000_000 <= stamp_ns <= time.time_ns() - 5_000_000_000
+
+
+def test_a_device_that_is_no_camera_is_named(settings):
+    with pytest.raises(SourceError, match='/dev/zero is no camera; expected a Video4Linux'):
+        DeviceSource(settings('/dev/zero'))
+
+
+def test_another_size_is_a_lost_camera(open_device):
     larger = (True, np.zeros((48, 64, 3), np.uint8))
-    source = LiveSource('camera', Capture([GOOD, larger]), 'bgr8')
-    source.read()
+    device = open_device(Capture([GOOD, larger]))
+    device.read()
     with pytest.raises(SourceLostError, match='changed its size from 32x24 px to 64x48 px'):
-        source.read()
+        device.read()
 
 
 def test_a_device_that_is_unplugged_is_lost_at_once(open_device):

@@ -1,5 +1,7 @@
 """What a source's name means, and what is said of one that means nothing."""
 
+import os
+
 import pytest
 
 from fisheye_capture import sources
@@ -28,7 +30,7 @@ def test_devices(settings, monkeypatch, name):
     assert open_source(settings(name)) == name
 
 
-@pytest.mark.parametrize('scheme', ['http', 'https', 'rtsp', 'rtsps', 'udp'])
+@pytest.mark.parametrize('scheme', ['http', 'https', 'rtsp', 'rtsps', 'udp', 'RTSP'])
 def test_streams(settings, monkeypatch, scheme):
     monkeypatch.setattr(sources, 'StreamSource', lambda settings: settings.source)
     assert open_source(settings(f'{scheme}://camera/stream')) == f'{scheme}://camera/stream'
@@ -49,6 +51,12 @@ def test_an_unknown_scheme_is_refused_with_those_that_are_known(settings):
     [
         ('rtsp://user:secret@camera:554/live', 'rtsp://camera:554/live'),
         ('http://camera/live@2x', 'http://camera/live@2x'),
+        ('rtsp://user:p/w@rd@host:554/live', 'rtsp://host:554/live'),
+        ('rtsp://user@host/live', 'rtsp://host/live'),
+        ('http://host/mjpg?user=me&pwd=secret&size=2', 'http://host/mjpg?user=***&pwd=***&size=2'),
+        ('rtsp://host/user=me_password=secret_channel=1', 'rtsp://host/user=***'),
+        ('http://host/a.cgi?Token=abc', 'http://host/a.cgi?Token=***'),
+        ('user:secret@host', 'host'),
         ('rig//left@home.png', 'rig//left@home.png'),
     ],
 )
@@ -59,6 +67,28 @@ def test_a_source_is_shown_without_its_password(source, shown):
 def test_a_refusal_does_not_tell_the_password(settings):
     with pytest.raises(SourceError, match="source 'ftp://camera' has the scheme"):
         open_source(settings('ftp://user:secret@camera'))
+
+
+def test_a_typing_error_does_not_tell_the_password(settings):
+    with pytest.raises(SourceError, match="source 'rtsp:/host/live' is not there"):
+        open_source(settings('rtsp:/user:secret@host/live'))
+
+
+@pytest.mark.parametrize('name', ['pipe.png', 'pipe.mp4', 'zero.png'])
+def test_what_never_ends_is_named(settings, tmp_path, name):
+    path = tmp_path / name
+    if name == 'zero.png':
+        path.symlink_to('/dev/zero')
+    else:
+        os.mkfifo(path)
+    with pytest.raises(SourceError, match=f'{name} is no regular file; expected a picture'):
+        open_source(settings(path))
+
+
+def test_a_fifo_in_a_folder_is_named(settings, tmp_path):
+    os.mkfifo(tmp_path / 'a.png')
+    with pytest.raises(SourceError, match=r'a\.png is no regular file'):
+        open_source(settings(tmp_path))
 
 
 @pytest.mark.parametrize('name', ['nowhere.png', 'nowhere/*.png', '', '~no_such_user/x'])

@@ -6,8 +6,10 @@ from threading import Thread
 import pytest
 from mjpeg_server import MjpegServer, jpeg
 
+from fisheye_capture import stream
 from fisheye_capture.source import SourceLostError
 from fisheye_capture.stream import StreamSource
+from fisheye_geometry.errors import SourceError
 
 CODING_LOSS = 4
 """Grey levels by which JPEG may miss a plain picture."""
@@ -43,9 +45,15 @@ def test_frames_come_with_the_time_at_which_they_came(camera, open_stream, encod
     assert before_ns < first.stamp_ns < second.stamp_ns <= time.time_ns()
 
 
+def test_without_pyav_it_is_said_what_to_install(open_stream, monkeypatch):
+    monkeypatch.setattr(stream.importlib.util, 'find_spec', lambda name: None)
+    with pytest.raises(SourceError, match='sudo apt install python3-av, or pip install av'):
+        open_stream('http://127.0.0.1:1/stream')
+
+
 def test_nobody_there_is_said_without_the_password(open_stream):
     source = open_stream('http://user:secret@127.0.0.1:1/stream')
-    with pytest.raises(SourceLostError, match=r'^http://127\.0\.0\.1:1/stream cannot be opened'):
+    with pytest.raises(SourceLostError, match=r'^http://127\.0\.0\.1:1/stream refuses the'):
         source.read()
 
 

@@ -8,6 +8,7 @@ from fisheye_geometry.errors import ImageFormatError
 _PNG = b'\x89PNG\r\n\x1a\n'
 _JPEG = b'\xff\xd8'
 _END = b'\xff\xd9'
+_SCAN = b'\xff\xda'
 _MAX_PIXELS = 50_000_000
 """A few bytes can claim to be more than fits into memory."""
 _NO_FRAMES = 0xC4, 0xC8, 0xCC
@@ -48,9 +49,14 @@ def size_of(coded: np.ndarray) -> tuple[int, int]:
 
 
 def whole_jpeg(coded: np.ndarray) -> np.ndarray | None:
-    """Give a JPEG (n,) uint8 without what lies behind its end; None if it is torn before."""
-    end = coded.tobytes().rfind(_END)
-    return None if end < 0 else coded[: end + len(_END)]
+    """Return a JPEG (n,) uint8 without what lies behind its end; None if it is torn before."""
+    data = coded.tobytes()
+    # An end before the scan is that of a thumbnail; within it no pixels look like an end.
+    at = len(_JPEG)
+    while data[at : at + 1] == b'\xff' and data[at : at + 2] != _SCAN:
+        at += 1 if data[at + 1 : at + 2] == b'\xff' else 2 + _number(data[at + 2 : at + 4])
+    end = data.find(_END, at)
+    return None if end < 0 or data[at : at + 2] != _SCAN else coded[: end + len(_END)]
 
 
 def decoded(coded: np.ndarray, *, grey: bool = False) -> np.ndarray:
@@ -62,10 +68,6 @@ def decoded(coded: np.ndarray, *, grey: bool = False) -> np.ndarray:
         If it is no picture, one that is too large, or not of the size that its head claims.
     """
     width, height = size_of(coded)
-    if not 1 <= width * height <= _MAX_PIXELS:
-        raise ImageFormatError(
-            f'a picture of {width}x{height} px; expected up to {_MAX_PIXELS / 1e6:g} million px'
-        )
     image = pixels_of(coded, grey=grey)
     if image.shape[:2] != (height, width):
         raise ImageFormatError(
@@ -97,6 +99,7 @@ def pixels_of(coded: np.ndarray, *, grey: bool = False) -> np.ndarray:
     ImageFormatError
         If it is broken, of no known kind, or too large for OpenCV.
     """
+    _check_claim(coded)
     kind = cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR
     try:
         image = cv2.imdecode(coded, kind | cv2.IMREAD_IGNORE_ORIENTATION) if coded.size else None
@@ -105,6 +108,18 @@ def pixels_of(coded: np.ndarray, *, grey: bool = False) -> np.ndarray:
     if image is None:
         raise ImageFormatError(f'{coded.size} bytes are a broken picture')
     return image
+
+
+def _check_claim(coded):
+    """Refuse a JPEG or PNG whose head claims a size that no camera has."""
+    try:
+        width, height = size_of(coded)
+    except ImageFormatError:
+        return  # Of another kind, or none.
+    if not 1 <= width * height <= _MAX_PIXELS:
+        raise ImageFormatError(
+            f'a picture of {width}x{height} px; expected up to {_MAX_PIXELS / 1e6:g} million px'
+        )
 
 
 def _number(data: memoryview) -> int:

@@ -1,6 +1,7 @@
 """Picture files: which there are in a folder or a glob, and their pixels."""
 
 import os
+import stat
 from collections.abc import Collection
 from glob import escape, glob
 from pathlib import Path
@@ -13,6 +14,8 @@ from fisheye_geometry.errors import ImageFormatError, SourceError
 SUFFIXES = frozenset(
     {'.bmp', '.jp2', '.jpeg', '.jpg', '.pbm', '.pgm', '.png', '.ppm', '.tif', '.tiff', '.webp'}
 )
+_MAX_BYTES = 200_000_000
+"""More than the largest picture has that is taken, even if it is not compressed."""
 
 
 def is_picture(path: str | Path) -> bool:
@@ -70,9 +73,24 @@ def read_picture(path: str | Path, *, grey: bool = False) -> np.ndarray:
         If the file cannot be read, or is no picture; the sentence names it.
     """
     try:
-        content = np.frombuffer(Path(path).read_bytes(), np.uint8)
-        return pixels_of(content, grey=grey)
+        return pixels_of(np.frombuffer(_content(path), np.uint8), grey=grey)
     except OSError as error:
         raise SourceError(f'{path} cannot be read: {error.strerror}') from error
     except ImageFormatError as error:
-        raise SourceError(f'{path} is not a picture that can be read') from error
+        raise SourceError(f'{path} is not a picture that can be read: {error}') from error
+
+
+def _content(path):
+    """Read a regular file of a size that a picture can have; a FIFO or device never ends."""
+    # Without O_NONBLOCK, opening a FIFO waits for somebody who writes.
+    file = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    with os.fdopen(file, 'rb') as opened:
+        status = os.fstat(file)
+        if not stat.S_ISREG(status.st_mode):
+            raise SourceError(f'{path} is no regular file; expected a picture')
+        if status.st_size > _MAX_BYTES:
+            raise SourceError(
+                f'{path} has {status.st_size / 1e6:.0f} MB; expected a picture of up to '
+                f'{_MAX_BYTES / 1e6:.0f} MB'
+            )
+        return opened.read(_MAX_BYTES)

@@ -61,3 +61,12 @@ def test_a_jpeg_ends_where_it_says():
     np.testing.assert_array_equal(whole_jpeg(padded), coded)
     assert whole_jpeg(coded[:-10]) is None
     np.testing.assert_array_equal(decoded(padded), cv2.imdecode(coded, cv2.IMREAD_COLOR))
+
+
+def test_the_end_of_a_thumbnail_is_not_that_of_its_picture():
+    coded = cv2.imencode('.jpg', PICTURE)[1].tobytes()
+    segment = b'\xff\xe1' + (len(coded) + 2).to_bytes(2, 'big') + coded
+    whole = np.frombuffer(coded[:2] + segment + coded[2:], np.uint8)
+    np.testing.assert_array_equal(whole_jpeg(whole), whole)
+    assert whole_jpeg(whole[:-10]) is None
+    assert whole_jpeg(whole[:40]) is None

@@ -122,9 +122,11 @@ class _OwnEye(_Eye):
     def report(self, report: Report) -> None:
         grabber = self._grabber
         report.values[f'{self._name} skipped'] = grabber.skipped
+        report.values[f'{self._name} damaged'] = grabber.damaged
         for level, sentence in (
             (ERROR, grabber.complaint),
             (WARN, grabber.note),
+            (WARN, grabber.damage()),
             (ERROR, self._fault),
             (WARN, self._seen.note),
         ):
