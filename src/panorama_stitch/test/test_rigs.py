@@ -12,6 +12,7 @@ from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.lens import make_lens
 from fisheye_geometry.level import levelled
+from fisheye_geometry.remap import RemapTable
 from fisheye_geometry.rig import chain
 from fisheye_geometry.rig_solution import solve_rig
 from fisheye_geometry.surface import surface_for
@@ -187,3 +188,37 @@ def test_the_field_data_follow_the_same_conventions():
         down = levelled(found.attitudes, is_closed=found.is_closed)[0].T @ [0, 1, 0]
         if path.parent.name in ('tilt_down_5', 'tilt_down_12', 'mixed_lenses', 'ring_3'):
             assert down == pytest.approx(attitudes[0].T @ [0, 1, 0], abs=1e-6)
+
+
+MAGENTA = (255, 0, 255)
+
+
+@pytest.mark.parametrize('blend', ['none', 'feather', 'multiband'])
+def test_the_robot_itself_is_hidden_where_another_camera_sees_the_place(blend):
+    yaws = np.radians([-55, 55])
+    attitudes = [Attitude(yaw) for yaw in yaws]
+    images = [Scene().view(FISHEYE, attitude).frame(STAMP_NS) for attitude in attitudes]
+    # A part of the left picture that the right camera sees too, and one that it does not.
+    shared, alone = np.s_[60:180, 255:285], np.s_[100:140, 100:120]
+    body = np.zeros(images[0].shape[:2], bool)
+    body[shared] = body[alone] = True
+    images[0][body] = MAGENTA
+    surface = surface_for(FISHEYE)
+    masks = [body, None]
+    views = [
+        View(FISHEYE, surface, attitude=attitude, body=mask)
+        for attitude, mask in zip(attitudes, masks, strict=True)
+    ]
+    style = Style(blend=blend, is_gain_compensated=False)
+    layout, out = composed(views, images, False, style)
+    truth = Scene().view(layout.surface).frame(STAMP_NS)
+    is_body = np.abs(out.astype(int) - MAGENTA).max(axis=2) < 60
+    window = layout.surface
+    drawn = RemapTable(FISHEYE, window, 'nearest', attitudes[0])(
+        np.where(body, 255, 0).astype(np.uint8)
+    )
+    drawn[:, : window.width // 3] = 0
+    assert (drawn > 0).sum() > 1000
+    assert not is_body[drawn > 0].any(), 'hidden'
+    assert psnr(out, truth, drawn > 0) > FAITHFUL_DB - 5  # its edges are where pixels mix
+    assert is_body[:, : window.width // 3].sum() > 500, 'nothing else is known of that place'

@@ -1,9 +1,10 @@
 """Pictures to panorama.
 
-`build` is the recipe. In the order in which to read: `view` (one camera's pictures), `placing`
-(the surface around the rig, and where each camera shows anything), `layout` and `crop` (which
-columns are whose), `seam` (where neighbours agree best), `fade` and `blend` (how they meet
-there), `optical_flow` and `flow` (how near things meet, too), `gain` (how they become equally
-bright), `compositor` (all of it, frame after frame). `stale` marks cameras that went silent;
-`parallel` shares the rows between threads.
+`build` is the recipe, `posing` gives it the views of a rig. In the order in which to read: `view`
+(one camera's pictures), `placing` (the surface around the rig, and where each camera shows
+anything), `layout` and `crop` (which columns are whose), `seam` (where neighbours agree best),
+`fade` and `blend` (how they meet there), `optical_flow` and `flow` (how near things meet, too),
+`gain` (how they become equally bright), `compositor` (all of it, frame after frame). `mask` tells
+where a camera sees the robot itself, `stale` marks cameras that went silent; `parallel` shares
+the rows between threads.
 """

@@ -9,6 +9,7 @@ import numpy as np
 
 _COARSEST_COLUMNS = 8
 """A multiband blend halves its strip until so few columns are left to fade over."""
+_ALONE = 1e-4
 _UNIT = 1 << 14
 """A weight of 1, as an integer."""
 
@@ -70,7 +71,8 @@ class Feather:
         """
         begin, end = fade or (0, left_seen.shape[1])
         columns = np.arange(left_seen.shape[1], dtype=np.float32) + 0.5 - begin
-        ramp = (columns / max(end - begin, 1e-3)).clip(0, 1)
+        # Beyond the fade a view shows where it is alone, and so little elsewhere that nobody sees.
+        ramp = (columns / max(end - begin, 1e-3)).clip(_ALONE, 1 - _ALONE)
         weights = left_seen * (1 - ramp), right_seen * ramp
         # Where no view shows anything it stays black with any weights.
         total = np.maximum(weights[0] + weights[1], np.finfo(np.float32).tiny)
