@@ -122,4 +122,6 @@ class SeenLens:
         """Learn from the next picture (height, width[, channels]); whether `lens` may be news."""
         self._pictures += 1
         is_due = self._pictures & (self._pictures - 1) == 0
+        if not self._lens.has_image_circle:
+            return self._pictures == 1
         return is_due and (self._circle.look(image) or self._pictures == 1)

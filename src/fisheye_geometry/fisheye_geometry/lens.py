@@ -2,18 +2,20 @@
 
 import numpy as np
 
+from fisheye_geometry.annular_lens import AnnularLens
 from fisheye_geometry.errors import CalibrationError
 from fisheye_geometry.fisheye_lens import FisheyeLens
 from fisheye_geometry.lens_model import MAX_PICTURE_SIDE_PX, Lens
 from fisheye_geometry.pinhole_lens import PinholeLens
 
-__all__ = ['MAX_PICTURE_SIDE_PX', 'FisheyeLens', 'Lens', 'PinholeLens', 'make_lens']
+__all__ = ['MAX_PICTURE_SIDE_PX', 'AnnularLens', 'FisheyeLens', 'Lens', 'PinholeLens', 'make_lens']
 
 _MODELS = {
     'equidistant': FisheyeLens,
     'fisheye': FisheyeLens,
     'plumb_bob': PinholeLens,
     'rational_polynomial': PinholeLens,
+    'annular': AnnularLens,
 }
 
 
@@ -24,7 +26,7 @@ def make_lens(model: str, width: int, height: int, matrix, distortion) -> Lens:
     ----------
     model
         `distortion_model` of REP-104: `equidistant` (or `fisheye`), `plumb_bob`,
-        `rational_polynomial`.
+        `rational_polynomial`; and `annular`, which is none of ROS's.
     width, height
         Size of the picture, px.
     matrix

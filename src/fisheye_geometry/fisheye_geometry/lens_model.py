@@ -38,6 +38,8 @@ class Lens(ABC):
         Radius of the image circle where it is known; `max_angle_rad` never exceeds it.
     model
         `distortion_model` in a camera_info.
+    has_image_circle
+        Whether the lens lights a circle around its axis, or something else.
     coefficient_counts
         How many coefficients the model may have.
 
@@ -59,6 +61,7 @@ class Lens(ABC):
 
     model: ClassVar[str] = ''
     coefficient_counts: ClassVar[tuple[int, ...]] = ()
+    has_image_circle: ClassVar[bool] = True
 
     def __post_init__(self):
         for name in ('width', 'height'):
@@ -169,6 +172,15 @@ class Lens(ABC):
         if not seen:
             return self.max_angle_rad
         return float(np.arctan2(hypot(ray[0], ray[1]), ray[2]))
+
+    def field_rad(self) -> tuple[float, float, float, float]:
+        """Return what it sees to the left, right, up and down of its axis, rad."""
+        return (
+            self.angle_at(-0.5, self.center_y_px),
+            self.angle_at(self.width - 0.5, self.center_y_px),
+            self.angle_at(self.center_x_px, -0.5),
+            self.angle_at(self.center_x_px, self.height - 0.5),
+        )
 
     def seen_within(self, angle_rad: float) -> 'Lens':
         """Give the same lens with an image circle of this radius, rad."""

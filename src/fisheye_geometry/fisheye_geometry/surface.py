@@ -178,18 +178,9 @@ def surface_for(
             f'a {kind} surface holds less than {np.degrees(how.fov_limit_rad):g} degrees; '
             f'{np.degrees(max(hfov_rad, vfov_rad)):g} were asked'
         )
-    left, right = _extent(
-        hfov_rad,
-        lens.angle_at(-0.5, lens.center_y_px),
-        lens.angle_at(lens.width - 0.5, lens.center_y_px),
-        how.widest_rad,
-    )
-    up, down = _extent(
-        vfov_rad,
-        lens.angle_at(lens.center_x_px, -0.5),
-        lens.angle_at(lens.center_x_px, lens.height - 0.5),
-        how.steepest_rad,
-    )
+    sees = lens.field_rad()
+    left, right = _extent(hfov_rad, *sees[:2], how.widest_rad)
+    up, down = _extent(vfov_rad, *sees[2:], how.steepest_rad)
     columns = how.column(left) + how.column(right)
     rows = how.row(up) + how.row(down)
     if scale == 'fit':

@@ -10,7 +10,7 @@ from scenes import data_folder
 from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.attitude import Attitude
-from fisheye_geometry.lens import make_lens
+from fisheye_geometry.lens import AnnularLens, make_lens
 from fisheye_geometry.level import levelled
 from fisheye_geometry.remap import RemapTable
 from fisheye_geometry.rig import chain
@@ -32,6 +32,7 @@ WIDE = synthetic_lens(400, 400, np.radians(200)).seen_within(np.radians(100))
 SMALL = synthetic_lens(240, 180, np.radians(160))
 PLAIN = make_lens('plumb_bob', 240, 180, [148.2, 0, 119.5, 0, 148.2, 89.5, 0, 0, 1], [])
 """78 degrees across."""
+MIRROR = AnnularLens(480, 480, 235, 235, 239.5, 239.5, (0.5, *np.radians([-35, 20]), -1.0))
 
 RIGS = {
     'looking down': ([(-70, -15, 0), (70, -15, 0)], FISHEYE, False),
@@ -46,6 +47,8 @@ RIGS = {
     'a turned ring': ([(100, 0, 0), (190, 0, 0), (280, 0, 0), (10, 0, 0)], FISHEYE, True),
     'six conventional': ([(yaw, 0, 0) for yaw in range(-150, 180, 60)], PLAIN, True),
     'eight': ([(yaw, -5, 0) for yaw in range(-160, 180, 45)], SMALL, True),
+    'a mirror': ([(0, 0, 0)], MIRROR, True),
+    'a leaning mirror': ([(30, 4, -3)], MIRROR, True),
     'three wide': ([(-95, -2, 0), (0, -2, 0), (95, -2, 0)], FISHEYE, False),
 }
 

@@ -111,7 +111,7 @@ class View:
             rays = surface.rays(x + to_sides, y)
             sides = np.arctan2(rays[:, 0], rays[:, 2])
         rays = surface.rays(x, np.array([-0.5, surface.height - 0.5]))
-        up, down = np.abs(np.arctan2(rays[:, 1], rays[:, 2]))
+        up, down = np.arctan2(rays[:, 1], rays[:, 2]) * (-1, 1)
         return float(sides[0]), float(sides[1]), float(up), float(down)
 
     def shows_scene(self, table: 'RemapTable | Copy') -> np.ndarray:
