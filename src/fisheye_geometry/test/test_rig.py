@@ -81,7 +81,10 @@ def test_impossible_rigs_are_refused(names, words):
         Rig(tuple(map(camera, names)))
 
 
-def test_a_rig_knows_its_pairs_and_takes_attitudes():
-    rig = Rig(tuple(map(camera, 'abcd')), is_closed=True).with_attitudes(RING)
+def test_a_rig_knows_its_pairs_and_what_lies_between_them():
+    cameras = [RigCamera(n, LENS, Attitude.of(m)) for n, m in zip('abcd', RING, strict=True)]
+    rig = Rig(tuple(cameras), is_closed=True)
     assert rig.pairs[-1] == (3, 0)
-    assert np.degrees(rig.yaws_rad) == pytest.approx([-135, -45, 45, 135])
+    assert [np.degrees(rig.yaw_between(pair)) for pair in rig.pairs] == pytest.approx([90] * 4)
+    relative = rig.relative(rig.pairs[1])
+    assert relative.matrix == pytest.approx(RING[1].T @ RING[2], abs=EXACT)
