@@ -20,7 +20,7 @@ import numpy as np
 from overlap_cases import Case, cases
 from overlap_picture import draw
 
-from panorama_stitch.overlap import METHODS, Overlap, OverlapSettings, measure_overlap
+from panorama_stitch.overlap_measurement import METHODS, Overlap, OverlapSettings, measure_overlap
 from panorama_stitch.particles import facing_halves
 
 FIRST_SEED = 5000

@@ -15,7 +15,7 @@ from panorama_stitch.compose.build import Style, build_compositor
 from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.compose.posing import views_at_overlaps
 from panorama_stitch.compose.view import View
-from panorama_stitch.overlap import measure_overlap
+from panorama_stitch.overlap_measurement import measure_overlap
 from panorama_stitch.overlap_result import Overlap, side_by_side
 from panorama_stitch.settings import PanoramaOutputSettings
 

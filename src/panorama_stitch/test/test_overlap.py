@@ -24,7 +24,7 @@ from fisheye_geometry.errors import OverlapError
 from fisheye_geometry.remap import LEVEL, Turn
 from fisheye_geometry.surface import SURFACES, Surface, surface_for
 from panorama_stitch import registration
-from panorama_stitch.overlap import METHODS, OverlapSettings, measure_overlap
+from panorama_stitch.overlap_measurement import METHODS, OverlapSettings, measure_overlap
 from panorama_stitch.proposals import Proposals
 
 SETTINGS = OverlapSettings()

@@ -1,0 +1,8 @@
+"""Where two neighbouring cameras look, measured on what both see.
+
+`measure` is the recipe. In the order in which to read: `view` (an image and its camera model),
+`features` (what can be recognised), `correspondences` (which are alike), `rotation` (which
+rotations they propose), `strips` (the overlap that a rotation makes), `votes` (how each patch of
+it is displaced), `parallax` (the rotation at which the far scene agrees), `confidence` (how
+probably that is right).
+"""

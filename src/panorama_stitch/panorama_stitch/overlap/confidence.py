@@ -1,0 +1,77 @@
+"""The probability that a measured rotation is right within half a degree."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+RIGHT_RAD = np.radians(0.5)
+"""What `right` means."""
+_WEIGHTS = (-6.0, 1.0, 1.0, 3.0, 1.0, 1.0, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What a measurement's votes amount to.
+
+    Attributes
+    ----------
+    far
+        Area that agrees with what is far, in patches.
+    share
+        The same as a share of all that voted near the answer.
+    explained
+        The same of all that shows anything.
+    coverage
+        The same of the whole overlap.
+    coarse_share
+        The same of all that voted within some degrees of the answer.
+    support
+        Weight of the matched features that proposed it.
+    rivalled
+        Weight of those that proposed the best other rotation.
+    near_share
+        Share of those that nearness explains.
+    lead
+        By how much any other depth fits worse.
+    deviation_rad
+        Largest standard deviation of the rotation.
+    peak
+        Mean correlation of the patches that agree.
+    """
+
+    far: float
+    share: float
+    explained: float
+    coverage: float
+    coarse_share: float
+    support: float
+    rivalled: float
+    near_share: float
+    lead: float
+    deviation_rad: float
+    peak: float
+
+    @property
+    def features(self) -> np.ndarray:
+        """(12,) what the logistic regression works on."""
+        return np.array(
+            [
+                1.0,
+                np.log(self.far + 1.0),
+                self.share,
+                self.explained,
+                self.coverage,
+                self.coarse_share,
+                self.near_share,
+                np.log(self.support + 0.1),
+                np.log(self.rivalled + 0.1),
+                np.log(max(self.lead, 0.0) + 0.1),
+                -np.log(self.deviation_rad),
+                np.log(1.0001 - self.peak),
+            ]
+        )
+
+
+def confidence(evidence: Evidence) -> float:
+    """Return the probability, 0 to 1, that the rotation is right."""
+    return float(1 / (1 + np.exp(-np.dot(_WEIGHTS, evidence.features))))
