@@ -13,7 +13,7 @@ from compose import WAYS, Composing, composing_targets, measure_composing
 from machine import describe_machine
 from nodes import Run, measure_nodes, node_targets
 
-from fisheye_geometry.errors import FisheyeError
+from fisheye_core.errors import FisheyeError
 
 PAPER_HZ = {'laptop': 11, 'embedded computer': 6}
 """Panoramas a second of two 640x480 cameras with nearest neighbours, as published."""

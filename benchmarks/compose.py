@@ -21,7 +21,7 @@ from fisheye_geometry.surface import Surface
 from panorama_stitch.compose.compositor import BLENDS, Compositor
 from panorama_stitch.compose.layout import Layout
 from panorama_stitch.compose.view import View
-from panorama_stitch.settings import PanoramaSettings
+from panorama_stitch.pipeline.panorama_settings import PanoramaSettings
 
 SIZES = (640, 480), (1280, 960), (1920, 1080)
 FLAGS = {'nearest': cv2.INTER_NEAREST, 'linear': cv2.INTER_LINEAR, 'cubic': cv2.INTER_CUBIC}

@@ -10,11 +10,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
-from health import usage
+from fisheye_testing.health import usage
 from pairs import SIDES, synthetic_pair
-from rig import Rig, camera_parameters, unused_domain, wait_for
+from fisheye_testing.rig import Rig, camera_parameters, unused_domain, wait_for
 from targets import Target
-from watcher import Watcher
+from fisheye_testing.watcher import Watcher
 
 from fisheye_geometry.camera_file import Camera, write_camera
 

@@ -20,8 +20,8 @@ import numpy as np
 from overlap_cases import Case, cases
 from overlap_picture import draw
 
-from panorama_stitch.overlap_measurement import METHODS, Overlap, OverlapSettings, measure_overlap
-from panorama_stitch.particles import facing_halves
+from panorama_stitch.overlap.measure_overlap import METHODS, Overlap, OverlapSettings, measure_overlap
+from panorama_stitch.overlap.particles import facing_halves
 
 FIRST_SEED = 5000
 RIGHT_DEG, RIG_DEG, SHARE = 0.5, 0.35, 0.99

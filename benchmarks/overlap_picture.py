@@ -5,7 +5,7 @@ import numpy as np
 
 from fisheye_geometry.remap import RemapTable
 from fisheye_geometry.surface import Surface
-from panorama_stitch.overlap_result import Overlap
+from panorama_stitch.overlap.overlap_result import Overlap
 
 BOX, MATCH, EDGE, TEXT = (90, 170, 90), (0, 200, 255), (255, 160, 0), (255, 255, 255)
 GAP, LINE_PX = 12, 22

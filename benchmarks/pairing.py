@@ -7,7 +7,7 @@ each; frames are those of the slowest camera. Prints the table of docs/stitch.md
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from free_running import Camera, Paired, pair
+from fisheye_testing.free_running import Camera, Paired, pair
 
 PHASES = (0.0, 0.1, 0.25, 0.4, 0.45, 0.5, 0.55, 0.6, 0.75, 0.9)
 """Of the period of the second camera, behind the first."""

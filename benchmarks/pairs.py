@@ -16,9 +16,9 @@ from fisheye_geometry.camera_file import read_camera
 from fisheye_geometry.image_circle import ImageCircle
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.remap import Turn
-from panorama_stitch.overlap_result import Overlap
-from panorama_stitch.settings import PanoramaSettings
-from panorama_stitch.stitcher import Stitcher
+from panorama_stitch.overlap.overlap_result import Overlap
+from panorama_stitch.pipeline.panorama_settings import PanoramaSettings
+from panorama_stitch.pipeline.rig_state import RigState
 
 SIDES = ('left', 'right')
 YAWS = radians(-70), radians(70)
@@ -34,9 +34,9 @@ class Pair:
     images: Sequence[np.ndarray]
     is_synthetic: bool = False
 
-    def stitcher(self, settings: PanoramaSettings) -> Stitcher:
+    def stitcher(self, settings: PanoramaSettings) -> RigState:
         """Know the cameras, and the overlap: the true one of the synthetic rig, else measured."""
-        stitcher = Stitcher(SIDES)
+        stitcher = RigState(SIDES)
         for side, lens in zip(SIDES, self.lenses, strict=True):
             stitcher.place(side, lens, settings.surface_of(lens), settings.interpolation)
         if self.is_synthetic:
@@ -65,7 +65,7 @@ def folder_pair(folder: Path) -> Pair:
         lens = read_camera(folder / f'{side}.yaml').lens
         circle = ImageCircle(lens)
         circle.look(image)
-        lenses.append(lens.seen_within(circle.angle_rad))
+        lenses.append(lens.with_max_angle(circle.angle_rad))
         images.append(image)
     return Pair(folder.name, lenses, images)
 

@@ -19,7 +19,7 @@ import numpy as np
 from pairs import DATA
 
 from fisheye_geometry.camera_file import read_camera
-from fisheye_geometry.errors import FisheyeError
+from fisheye_core.errors import FisheyeError
 from fisheye_geometry.image_circle import ImageCircle
 from fisheye_geometry.level import DOWN
 from fisheye_geometry.rig_solution import solve_rig
@@ -112,7 +112,7 @@ def read_rig(folder: Path) -> FieldRig:
         lens = read_camera(folder / f'{name}.yaml').lens
         circle = ImageCircle(lens)
         circle.look(image)
-        lenses.append(lens.seen_within(circle.angle_rad))
+        lenses.append(lens.with_max_angle(circle.angle_rad))
     attitudes = [np.reshape(truth['attitude'][name], (3, 3)) for name in truth['cameras']]
     return FieldRig(folder.name, images, lenses, attitudes, truth['closed'])
 

@@ -21,10 +21,10 @@ from seams import judge_seams
 from similarity import similarity_map
 
 from fisheye_capture.scene import Scene
-from fisheye_geometry.errors import FisheyeError
+from fisheye_core.errors import FisheyeError
 from fisheye_geometry.remap import Turn
 from panorama_stitch.compose.compositor import BLENDS, Compositor
-from panorama_stitch.settings import PanoramaSettings
+from panorama_stitch.pipeline.panorama_settings import PanoramaSettings
 
 EXPOSURES = (1.0, 1.0), (1.0, 1.3)
 FRAMES = 60

@@ -4,8 +4,8 @@ import time
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from field import START_S, Field
-from mjpeg_server import jpeg
-from rig import wait_for
+from fisheye_testing.mjpeg_server import jpeg
+from fisheye_testing.rig import wait_for
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 LIVELY = 0.7

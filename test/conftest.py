@@ -6,8 +6,8 @@ from pathlib import Path
 import hypothesis
 import pytest
 from field import Field
-from rig import Rig, unused_domain
-from watcher import Watcher
+from fisheye_testing.rig import Rig, unused_domain
+from fisheye_testing.watcher import Watcher
 
 DATA = Path(os.environ.get('FISHEYE_DATA', ''))
 

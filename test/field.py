@@ -6,9 +6,9 @@ from math import radians
 from pathlib import Path
 
 import cv2
-from health import Health
-from mjpeg_server import MjpegServer
-from rig import SIDES, Rig, wait_for
+from fisheye_testing.health import Health
+from fisheye_testing.mjpeg_server import MjpegServer
+from fisheye_testing.rig import SIDES, Rig, wait_for
 
 from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, RegionOfInterest
 from std_msgs.msg import Header
 
-from fisheye_geometry.encodings import CHANNELS
+from fisheye_core.encodings import CHANNELS
 from fisheye_geometry.surface import SURFACES
 
 _SIZES = st.one_of(

@@ -25,10 +25,10 @@ def test_links_lead_somewhere(page):
 def test_every_node_has_a_page_with_its_parameters():
     described = ''.join(page.read_text() for page in PAGES)
     for settings in (
-        'fisheye_capture.settings.CaptureSettings',
-        'fisheye_undistort.settings.UndistortSettings',
-        'panorama_stitch.settings.StitchSettings',
-        'panorama_stitch.settings.PanoramaSettings',
+        'fisheye_capture.capture_settings.CaptureSettings',
+        'fisheye_undistort.undistort_settings.UndistortSettings',
+        'panorama_stitch.pipeline.panorama_settings.StitchSettings',
+        'panorama_stitch.pipeline.panorama_settings.PanoramaSettings',
         'panorama_viewer.settings.ViewerSettings',
     ):
         assert f'<!-- parameters: {settings} -->' in described

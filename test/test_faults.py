@@ -6,7 +6,7 @@ import camera_faults
 import pytest
 from camera_faults import ERROR, OK, check_camera_fault
 from field import START_S
-from rig import SEPARATE, wait_for
+from fisheye_testing.rig import SEPARATE, wait_for
 
 SAME_PX = 1e-6
 """An offset that was kept, not measured again."""

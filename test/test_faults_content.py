@@ -16,10 +16,10 @@ from fisheye_bridge.projection import surface_of
 from fisheye_bridge.stamps import ns_of, stamp_of
 from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.camera_file import Camera, read_camera, write_camera
-from fisheye_geometry.errors import CameraFileError, FisheyeError
-from fisheye_undistort.settings import UndistortSettings
-from panorama_stitch.overlap_file import read_overlaps, write_overlaps
-from panorama_stitch.overlap_measurement import Overlap
+from fisheye_core.errors import CameraFileError, FisheyeError
+from fisheye_undistort.undistort_settings import UndistortSettings
+from panorama_stitch.overlap.overlap_file import read_overlaps, write_overlaps
+from panorama_stitch.overlap.measure_overlap import Overlap
 
 EXAMPLES = 3000 if os.environ.get('LONG') else 300
 LENS = synthetic_lens(640, 480, 2.97)

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 from field import START_S
-from health import usage
+from fisheye_testing.health import usage
 from namespaces import Namespace
-from rig import SEPARATE, SIDES, Rig, wait_for
-from watcher import Watcher
+from fisheye_testing.rig import SEPARATE, SIDES, Rig, wait_for
+from fisheye_testing.watcher import Watcher
 
 TOOLS = Path(__file__).parents[1] / 'tools'
 RATE_HZ = 30.0

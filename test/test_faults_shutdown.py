@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from field import START_S, write_pictures
 from fisheye_msgs.srv import CalibrateOverlap
-from health import Health
-from mjpeg_server import MjpegServer, jpeg
-from rig import SIDES, Rig, unused_domain, wait_for
+from fisheye_testing.health import Health
+from fisheye_testing.mjpeg_server import MjpegServer, jpeg
+from fisheye_testing.rig import SIDES, Rig, unused_domain, wait_for
 from sensor_msgs.msg import Image
 
 from fisheye_bridge.qos import IMAGE_INPUT

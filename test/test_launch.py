@@ -9,8 +9,8 @@ import launching
 import pytest
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix
 from field import START_S
-from health import Health
-from rig import Rig, wait_for
+from fisheye_testing.health import Health
+from fisheye_testing.rig import Rig, wait_for
 
 FILE = Path(__file__).parents[1] / 'src' / 'panorama_stitch' / 'launch' / 'panorama.launch.py'
 CAPTURES = ('left/capture', 'right/capture')

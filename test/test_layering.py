@@ -8,6 +8,7 @@ import pytest
 
 SOURCE = Path(__file__).parents[1] / 'src'
 OURS = (
+    'fisheye_core',
     'fisheye_geometry',
     'fisheye_bridge',
     'fisheye_capture',
@@ -16,17 +17,19 @@ OURS = (
     'panorama_viewer',
 )
 BELOW = {
-    'fisheye_geometry': set(),
-    'fisheye_bridge': {'fisheye_geometry'},
-    'fisheye_capture': {'fisheye_geometry', 'fisheye_bridge'},
-    'fisheye_undistort': {'fisheye_geometry', 'fisheye_bridge'},
+    'fisheye_core': set(),
+    'fisheye_geometry': {'fisheye_core'},
+    'fisheye_bridge': {'fisheye_core', 'fisheye_geometry'},
+    'fisheye_capture': {'fisheye_core', 'fisheye_geometry', 'fisheye_bridge'},
+    'fisheye_undistort': {'fisheye_core', 'fisheye_geometry', 'fisheye_bridge'},
     'panorama_stitch': {
+        'fisheye_core',
         'fisheye_geometry',
         'fisheye_bridge',
         'fisheye_capture',
         'fisheye_undistort',
     },
-    'panorama_viewer': {'fisheye_geometry', 'fisheye_bridge'},
+    'panorama_viewer': {'fisheye_core', 'fisheye_geometry', 'fisheye_bridge'},
 }
 ROS = {
     'rclpy',
@@ -50,7 +53,7 @@ KEYS = {
     'ament_index_python': 'ament_index_python',
     'av': 'python3-av',
 }
-SHARED_SHELL = 'panorama_stitch.base_node'
+SHARED_SHELL = 'panorama_stitch.nodes.base_node'
 """The one node module that others build on: what stitch_node and panorama_node share."""
 
 MODULES = [

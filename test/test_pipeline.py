@@ -6,7 +6,7 @@ import os
 import time
 
 import pytest
-from rig import COMPOSED, SEPARATE, SIDES, camera_parameters, wait_for
+from fisheye_testing.rig import COMPOSED, SEPARATE, SIDES, camera_parameters, wait_for
 from sensor_msgs.msg import CameraInfo, CompressedImage
 
 from fisheye_bridge.camera_info import camera_of

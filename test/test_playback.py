@@ -5,8 +5,8 @@ import threading
 import numpy as np
 import pytest
 import rclpy
-from image_message import to_message
-from rig import wait_for
+from fisheye_testing.image_message import to_message
+from fisheye_testing.rig import wait_for
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header

@@ -13,7 +13,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from rig import camera_parameters, wait_for
+from fisheye_testing.rig import camera_parameters, wait_for
 from selenium import webdriver
 from selenium.webdriver import ActionChains, Keys
 

@@ -11,15 +11,15 @@ from pathlib import Path
 import cv2
 import numpy as np
 from contact_sheet import contact_sheet, with_particles
-from rig import SIDES, Rig, camera_parameters, unused_domain, wait_for
-from watcher import Watcher
+from fisheye_testing.rig import SIDES, Rig, camera_parameters, unused_domain, wait_for
+from fisheye_testing.watcher import Watcher
 
-from fisheye_capture.settings import CaptureSettings
+from fisheye_capture.capture_settings import CaptureSettings
 from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.camera_file import read_camera
-from fisheye_geometry.errors import FisheyeError, OverlapError
+from fisheye_core.errors import FisheyeError, OverlapError
 from fisheye_undistort.correction import Correction
-from fisheye_undistort.settings import UndistortSettings
+from fisheye_undistort.undistort_settings import UndistortSettings
 
 SYNTHETIC_OFFSET_DEG = 140.0
 START_TIMEOUT_S = 60.0

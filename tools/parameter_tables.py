@@ -5,7 +5,7 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
-from fisheye_geometry.settings import describe_range, rules
+from fisheye_core.settings import describe_range, rules
 
 DOCS = Path(__file__).parents[1] / 'docs'
 _TABLE = re.compile(r'(<!-- parameters: (\S+) -->\n).*?(<!-- end of parameters -->)', re.DOTALL)

@@ -1,6 +1,6 @@
 from glob import glob
 
-from setuptools import setup
+from setuptools import find_packages, setup
 
 package_name = 'panorama_stitch'
 
@@ -22,8 +22,8 @@ setup(
     extras_require={'test': ['hypothesis', 'pytest']},
     entry_points={
         'console_scripts': [
-            'panorama_node = panorama_stitch.panorama_node:main',
-            'stitch_node = panorama_stitch.stitch_node:main',
+            'panorama_node = panorama_stitch.nodes.panorama_node:main',
+            'stitch_node = panorama_stitch.nodes.stitch_node:main',
         ],
     },
 )

@@ -4,7 +4,7 @@ import concurrent.futures
 
 from rclpy.task import Future
 
-from fisheye_geometry.errors import FisheyeError
+from fisheye_core.errors import FisheyeError
 
 
 def awaitable(future: concurrent.futures.Future) -> Future:

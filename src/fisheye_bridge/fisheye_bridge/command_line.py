@@ -7,8 +7,8 @@ from typing import Any
 from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 
-from fisheye_geometry.errors import SettingError
-from fisheye_geometry.settings import Rule, describe_range, rules
+from fisheye_core.errors import SettingError
+from fisheye_core.settings import Rule, describe_range, rules
 
 
 def own_words() -> list[str]:

@@ -10,7 +10,7 @@ from rclpy.node import Node
 
 from fisheye_bridge.hearing import TOPIC, Hearing
 from fisheye_bridge.qos import HEARTBEAT
-from fisheye_geometry.errors import FisheyeError
+from fisheye_core.errors import FisheyeError
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 WARNING_PAUSE_S = 5.0
@@ -36,7 +36,7 @@ class Report:
         self.reasons.append(reason)
 
 
-class Shedding:
+class OverloadMonitor:
     """Warns while more comes than the machine handles."""
 
     def __init__(self, things: str):
@@ -56,7 +56,7 @@ class Shedding:
             )
 
 
-class Dropped:
+class DropCounter:
     """Counts what could not be used; says why, in the log and while there is more of it.
 
     Attributes

@@ -9,9 +9,9 @@ import numpy as np
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
-from fisheye_geometry.coded_picture import decoded
-from fisheye_geometry.encodings import CHANNELS, to_opencv
-from fisheye_geometry.errors import ImageFormatError
+from fisheye_core.coded_picture import decoded
+from fisheye_core.encodings import CHANNELS, to_opencv
+from fisheye_core.errors import ImageFormatError
 from fisheye_geometry.lens import MAX_PICTURE_SIDE_PX
 
 

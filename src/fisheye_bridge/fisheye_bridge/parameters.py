@@ -15,8 +15,8 @@ from rcl_interfaces.msg import (
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from fisheye_geometry.errors import FisheyeError
-from fisheye_geometry.settings import Rule, convert, describe_range, rules
+from fisheye_core.errors import FisheyeError
+from fisheye_core.settings import Rule, convert, describe_range, rules
 
 
 class Parameters:
@@ -44,7 +44,7 @@ class Parameters:
         node
             The node that gets them.
         settings
-            A frozen dataclass of `fisheye_geometry.settings.setting` fields.
+            A frozen dataclass of `fisheye_core.settings.setting` fields.
         prefix
             Put before each name, with its dot (`left.`).
         on_change

@@ -22,7 +22,7 @@ from fisheye_bridge.command_line import refuse_words, usage
 from fisheye_bridge.hearing import Hearing
 from fisheye_bridge.network import Links, forget_machine, refresher
 from fisheye_bridge.parameters import misspelt
-from fisheye_geometry.errors import FisheyeError
+from fisheye_core.errors import FisheyeError
 
 _Node = TypeVar('_Node', bound=Node)
 

@@ -9,10 +9,10 @@ from rclpy.node import Node
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
-from fisheye_bridge.diagnostics import Dropped
+from fisheye_bridge.diagnostics import DropCounter
 from fisheye_bridge.images import ImageBuffer, from_jpeg, jpeg_message, to_array, to_jpeg
 from fisheye_bridge.qos import ADJUSTABLE, BEST_EFFORT_INPUT, IMAGE, IMAGE_INPUT
-from fisheye_geometry.errors import FisheyeError
+from fisheye_core.errors import FisheyeError
 
 
 class Picture(Protocol):
@@ -78,7 +78,7 @@ class ImageSubscription:
 
     Attributes
     ----------
-    dropped : Dropped
+    dropped : DropCounter
         Pictures that were not usable.
     """
 
@@ -110,7 +110,7 @@ class ImageSubscription:
         jpeg = transport == 'compressed'
         self._kind, self._convert = (CompressedImage, from_jpeg) if jpeg else (Image, to_array)
         self._topic = f'{topic}/compressed' if jpeg else topic
-        self.dropped = Dropped(node, f'a picture on {self._topic}', key)
+        self.dropped = DropCounter(node, f'a picture on {self._topic}', key)
         self._subscribe(
             IMAGE_INPUT,
             event_callbacks=SubscriptionEventCallbacks(incompatible_qos=self._make_do),

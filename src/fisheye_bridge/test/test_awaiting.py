@@ -7,7 +7,7 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 
 from fisheye_bridge.awaiting import awaitable
-from fisheye_geometry.errors import FisheyeError, OverlapError
+from fisheye_core.errors import FisheyeError, OverlapError
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from std_msgs.msg import Header
 
 from fisheye_bridge.camera_topics import CameraSubscription
 from fisheye_bridge.diagnostics import WARN, Report
-from fisheye_geometry.errors import GeometryError
+from fisheye_core.errors import GeometryError
 
 FRAME_S = 1 / 30
 ODD = {'fx': 1938.0, 'fy': 213.0, 'd': [1.05, 1.76, 0.21, -0.62, 0.71], 'model': 'plumb_bob'}

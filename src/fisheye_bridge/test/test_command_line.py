@@ -9,8 +9,8 @@ import pytest
 from rclpy.node import Node
 
 from fisheye_bridge.running import run
-from fisheye_geometry.errors import SettingError
-from fisheye_geometry.settings import setting
+from fisheye_core.errors import SettingError
+from fisheye_core.settings import setting
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 
-from fisheye_bridge.diagnostics import OK, WARN, Diagnostics, Report, Shedding
+from fisheye_bridge.diagnostics import OK, WARN, Diagnostics, Report, OverloadMonitor
 
 DEADLINE_S = 10.0
 
@@ -19,7 +19,7 @@ def told(shedding, handled, shed):
 
 
 def test_a_warning_tells_what_was_shed_since_the_last_report():
-    shedding = Shedding('pairs')
+    shedding = OverloadMonitor('pairs')
     assert told(shedding, 20, 0).level == OK
     report = told(shedding, 35, 15)
     assert report.level == WARN
@@ -28,7 +28,7 @@ def test_a_warning_tells_what_was_shed_since_the_last_report():
 
 
 def test_little_is_not_worth_a_warning():
-    shedding = Shedding('pictures')
+    shedding = OverloadMonitor('pictures')
     assert told(shedding, 28, 2).level == OK
     assert told(shedding, 28, 2).level == OK, 'nothing came'
 

@@ -5,7 +5,7 @@ from array import array
 import cv2
 import numpy as np
 import pytest
-from image_message import to_message
+from fisheye_testing.image_message import to_message
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
@@ -15,8 +15,8 @@ from fisheye_bridge.images import (
     to_array,
     to_jpeg,
 )
-from fisheye_geometry.encodings import CHANNELS, converted
-from fisheye_geometry.errors import ImageFormatError
+from fisheye_core.encodings import CHANNELS, converted
+from fisheye_core.errors import ImageFormatError
 
 COLORS = np.zeros((8, 12, 3), np.uint8)
 COLORS[:, :6] = (200, 90, 40)

@@ -10,8 +10,8 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from fisheye_bridge.parameters import Parameters, misspelt
-from fisheye_geometry.errors import OverlapError, SettingError
-from fisheye_geometry.settings import rules, setting
+from fisheye_core.errors import OverlapError, SettingError
+from fisheye_core.settings import rules, setting
 
 
 @dataclass(frozen=True)

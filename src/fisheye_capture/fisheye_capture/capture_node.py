@@ -6,7 +6,7 @@ from sensor_msgs.srv import SetCameraInfo
 from std_msgs.msg import Header
 
 from fisheye_bridge.camera_info import camera_info_of, camera_of
-from fisheye_bridge.diagnostics import ERROR, WARN, Diagnostics, Dropped, Shedding
+from fisheye_bridge.diagnostics import ERROR, WARN, Diagnostics, DropCounter, OverloadMonitor
 from fisheye_bridge.parameters import Parameters
 from fisheye_bridge.qos import IMAGE
 from fisheye_bridge.running import run
@@ -14,12 +14,12 @@ from fisheye_bridge.stamps import stamp_of
 from fisheye_bridge.topics import ImagePublisher
 from fisheye_capture.calibration_url import calibration_path
 from fisheye_capture.grabber import Grabber
-from fisheye_capture.newest import Newest
-from fisheye_capture.settings import CaptureSettings
+from fisheye_core.latest_only import LatestOnlyWorker
+from fisheye_capture.capture_settings import CaptureSettings
 from fisheye_capture.source import Frame, JpegFrame, shown_source
 from fisheye_geometry.camera_file import Camera, read_camera, write_camera
-from fisheye_geometry.errors import CameraFileError, FisheyeError
-from fisheye_geometry.yaml_file import is_missing
+from fisheye_core.errors import CameraFileError, FisheyeError
+from fisheye_core.yaml_file import is_missing
 
 
 class CaptureNode(Node):
@@ -38,9 +38,9 @@ class CaptureNode(Node):
         self._image = ImagePublisher(self, 'image_raw')
         self._camera_info = self.create_publisher(CameraInfo, 'camera_info', IMAGE)
         self._info, self._described, self._fault = CameraInfo(), None, ''
-        self._broken = Dropped(self, 'a picture', 'pictures broken')
-        self._publishing = Newest(self._publish, 'publish')
-        self._shedding = Shedding('pictures')
+        self._broken = DropCounter(self, 'a picture', 'pictures broken')
+        self._publishing = LatestOnlyWorker(self._publish, 'publish')
+        self._shedding = OverloadMonitor('pictures')
         self._grabber = Grabber(self._settings, self._publishing.put, on_change=self._tell)
         self._camera = self._calibration()
         self.create_service(SetCameraInfo, 'set_camera_info', self._set_camera_info)
@@ -81,7 +81,7 @@ class CaptureNode(Node):
     def _describe(self, camera: Camera | None, width: int, height: int) -> None:
         """Prepare the camera_info of pictures of this size; without K if it is not known."""
         self._described = camera, width, height
-        self._fault = camera.misfit(width, height) if camera else 'the camera is not calibrated'
+        self._fault = camera.size_mismatch(width, height) if camera else 'the camera is not calibrated'
         if self._fault:
             self._info = CameraInfo(width=width, height=height)
             self.get_logger().warning(f'{self._fault}: camera_info is published without K')
@@ -94,8 +94,8 @@ class CaptureNode(Node):
             if self._calibration_path is None:
                 raise CameraFileError('camera_info_url is empty; expected the file to write')
             camera = camera_of(request.camera_info, self._settings.camera_name)
-            if self._described and (misfit := camera.misfit(*self._described[1:])):
-                raise CameraFileError(misfit)
+            if self._described and (misfit := camera.size_mismatch(*self._described[1:])):
+                raise CameraFileError(size_mismatch)
             write_camera(self._calibration_path, camera)
         except FisheyeError as error:
             response.success, response.status_message = False, str(error)

@@ -8,11 +8,11 @@ import cv2
 import numpy as np
 
 from fisheye_capture.pace import PacedSource
-from fisheye_capture.settings import CaptureSettings
+from fisheye_capture.capture_settings import CaptureSettings
 from fisheye_capture.source import SourceEndedError
-from fisheye_geometry.encodings import from_opencv
-from fisheye_geometry.errors import SourceError
-from fisheye_geometry.picture_file import read_picture
+from fisheye_core.encodings import from_opencv
+from fisheye_core.errors import SourceError
+from fisheye_core.picture_file import read_picture
 
 
 class PictureSource(PacedSource):

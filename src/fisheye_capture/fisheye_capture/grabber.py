@@ -3,11 +3,11 @@
 from collections.abc import Callable
 from threading import Event, Thread
 
-from fisheye_capture.rate import Rate
-from fisheye_capture.settings import CaptureSettings
+from fisheye_core.rate_meter import RateMeter
+from fisheye_capture.capture_settings import CaptureSettings
 from fisheye_capture.source import Frame, Source, SourceEndedError, SourceLostError
 from fisheye_capture.sources import open_source
-from fisheye_geometry.errors import FisheyeError
+from fisheye_core.errors import FisheyeError
 
 _FIRST_WAIT_S = 0.25
 """Before the first attempt to reopen; doubled before each further one."""
@@ -27,7 +27,7 @@ class Grabber:
         Vain attempts to open the source since the last frame.
     frames
         Frames handed over so far.
-    rate : Rate
+    rate : RateMeter
         Of these frames.
     """
 
@@ -58,7 +58,7 @@ class Grabber:
         self._settings = settings
         self._on_frame = on_frame
         self._on_change = on_change
-        self.rate = Rate()
+        self.rate = RateMeter()
         self._stopping = Event()
         self._thread = Thread(target=self._run, name=f'grab {settings.camera_name}', daemon=True)
         self.reason = 'waiting for the first picture'

@@ -7,7 +7,7 @@ import time
 import cv2
 import numpy as np
 
-from fisheye_capture.settings import CaptureSettings
+from fisheye_capture.capture_settings import CaptureSettings
 from fisheye_capture.source import (
     Frame,
     JpegFrame,
@@ -15,9 +15,9 @@ from fisheye_capture.source import (
     SourceEndedError,
     SourceLostError,
 )
-from fisheye_geometry.coded_picture import size_of, whole_jpeg
-from fisheye_geometry.encodings import from_opencv
-from fisheye_geometry.errors import ImageFormatError, SourceError
+from fisheye_core.coded_picture import size_of, whole_jpeg
+from fisheye_core.encodings import from_opencv
+from fisheye_core.errors import ImageFormatError, SourceError
 
 BROKEN_IN_A_ROW = 10
 """So many broken pictures one after the other are a broken camera."""

@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass
 from urllib.parse import quote
 
-from fisheye_capture.settings import CaptureSettings
+from fisheye_capture.capture_settings import CaptureSettings
 from fisheye_capture.source import CREDENTIALS, shown_source
 
 SCHEMES = ('http', 'https', 'rtsp', 'rtsps', 'udp')

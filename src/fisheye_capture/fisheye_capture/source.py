@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 
 from fisheye_geometry.camera_file import Camera
-from fisheye_geometry.coded_picture import decoded
-from fisheye_geometry.encodings import from_opencv
-from fisheye_geometry.errors import SourceError
+from fisheye_core.coded_picture import decoded
+from fisheye_core.encodings import from_opencv
+from fisheye_core.errors import SourceError
 
 
 class SourceLostError(SourceError):

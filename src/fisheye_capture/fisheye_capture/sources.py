@@ -12,12 +12,12 @@ from fisheye_capture.files import (
 )
 from fisheye_capture.live import DeviceSource
 from fisheye_capture.network_request import SCHEMES
-from fisheye_capture.settings import CaptureSettings
+from fisheye_capture.capture_settings import CaptureSettings
 from fisheye_capture.source import Source, shown_source
 from fisheye_capture.stream import StreamSource
 from fisheye_capture.synthetic import SyntheticSource
-from fisheye_geometry.errors import SourceError
-from fisheye_geometry.picture_file import is_picture, pictures_in
+from fisheye_core.errors import SourceError
+from fisheye_core.picture_file import is_picture, pictures_in
 
 
 def open_source(settings: CaptureSettings) -> Source:

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from fisheye_capture.settings import CaptureSettings
+from fisheye_capture.capture_settings import CaptureSettings
 
 PATIENCE_S = 20.0
 """Long enough for a busy machine; nothing waits for it that works."""

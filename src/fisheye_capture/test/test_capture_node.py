@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from odd_pictures import turned
+from fisheye_testing.odd_pictures import turned
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -19,11 +19,12 @@ from std_msgs.msg import Header
 from fisheye_bridge.camera_info import camera_info_of, camera_of
 from fisheye_bridge.images import from_jpeg, to_array
 from fisheye_bridge.qos import IMAGE
-from fisheye_capture import live, source
+from fisheye_capture import live
+from fisheye_capture import source
 from fisheye_capture.capture_node import CaptureNode
 from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.camera_file import Camera, read_camera, write_camera
-from fisheye_geometry.errors import CameraFileError, FisheyeError, SettingError, SourceError
+from fisheye_core.errors import CameraFileError, FisheyeError, SettingError, SourceError
 
 LENS = synthetic_lens(640, 480, np.radians(170))
 SMALL = synthetic_lens(32, 24, np.radians(170))

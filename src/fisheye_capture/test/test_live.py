@@ -10,7 +10,7 @@ import pytest
 from fisheye_capture import live
 from fisheye_capture.live import DeviceSource
 from fisheye_capture.source import SourceEndedError, SourceLostError
-from fisheye_geometry.errors import SourceError
+from fisheye_core.errors import SourceError
 
 GOOD = (True, np.full((24, 32, 3), 9, np.uint8))
 

@@ -6,10 +6,10 @@ import time
 from argparse import Namespace
 from pathlib import Path
 
-import network_camera
+from fisheye_testing import network_camera
 import numpy as np
 import pytest
-from painted_time import age_ms, read_image
+from fisheye_testing.painted_time import age_ms, read_image
 
 from fisheye_capture.source import SourceLostError
 from fisheye_capture.stream import StreamSource

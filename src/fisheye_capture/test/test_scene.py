@@ -101,7 +101,7 @@ def test_out_of_sight_the_ball_changes_nothing():
 
 
 def test_it_is_dark_outside_the_image_circle():
-    lens = lens_of(320, 240).seen_within(np.radians(60))
+    lens = lens_of(320, 240).with_max_angle(np.radians(60))
     frame = Scene().view(lens).frame(AT_SEAM_NS)
     y, x = np.ogrid[:240, :320]
     _, seen = lens.unproject(np.stack(np.broadcast_arrays(x, y), axis=-1))

@@ -7,7 +7,7 @@ import pytest
 from fisheye_capture import sources
 from fisheye_capture.source import SourceLostError, shown_source
 from fisheye_capture.sources import open_source
-from fisheye_geometry.errors import SourceError
+from fisheye_core.errors import SourceError
 
 
 def test_the_synthetic_camera_is_known_exactly(settings):

@@ -4,7 +4,7 @@ from math import pi
 
 import numpy as np
 
-from fisheye_geometry.errors import CalibrationError
+from fisheye_core.errors import CalibrationError
 from fisheye_geometry.lens_model import Lens
 
 _ROUNDING_RAD = 1e-9

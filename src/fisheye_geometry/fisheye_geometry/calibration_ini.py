@@ -2,8 +2,8 @@
 
 import re
 
-from fisheye_geometry.errors import CameraFileError
-from fisheye_geometry.plain_yaml import Mapping
+from fisheye_core.errors import CameraFileError
+from fisheye_core.plain_yaml import Mapping
 
 _BEGIN = re.compile(r'(\s|[#;][^\n]*\n)*\[[^\[\]\n]+\][ \t]*$', re.MULTILINE)
 _MATRICES = {

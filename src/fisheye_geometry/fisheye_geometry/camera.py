@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fisheye_geometry.errors import CalibrationError
+from fisheye_core.errors import CalibrationError
 from fisheye_geometry.lens import MAX_PICTURE_SIDE_PX, Lens
 
 IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -49,7 +49,7 @@ class Camera:
                     raise CalibrationError(f'{name} holds {value}; expected finite numbers')
         _check_plausible(self.lens)
 
-    def misfit(self, width: int, height: int) -> str:
+    def size_mismatch(self, width: int, height: int) -> str:
         """Say why pictures of a size, px, cannot be of this camera; '' if they can."""
         if (self.lens.width, self.lens.height) == (width, height):
             return ''

@@ -90,7 +90,7 @@ def _angles_at(lens: Lens, pixels: np.ndarray) -> np.ndarray:
     return np.where(seen, np.arccos(rays[..., 2].clip(-1, 1)), np.nan).astype(np.float32)
 
 
-class SeenLens:
+class CircledLens:
     """A lens as far as its light reaches in the pictures that came.
 
     The circle does not change: it is looked for in the first picture, the second, the fourth, ...
@@ -104,7 +104,7 @@ class SeenLens:
     @property
     def lens(self) -> Lens:
         """The lens within its circle."""
-        return self._lens.seen_within(self._circle.angle_rad)
+        return self._lens.with_max_angle(self._circle.angle_rad)
 
     @property
     def note(self) -> str:

@@ -10,7 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from fisheye_geometry.errors import CalibrationError
+from fisheye_core.errors import CalibrationError
 
 MAX_PICTURE_SIDE_PX = 16384
 """Larger pictures do not fit the 16-bit maps of OpenCV's remap."""
@@ -182,6 +182,6 @@ class Lens(ABC):
             self.angle_at(self.center_x_px, self.height - 0.5),
         )
 
-    def seen_within(self, angle_rad: float) -> 'Lens':
+    def with_max_angle(self, angle_rad: float) -> 'Lens':
         """Give the same lens with an image circle of this radius, rad."""
         return replace(self, visible_angle_rad=angle_rad)

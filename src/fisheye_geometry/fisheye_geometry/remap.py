@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from fisheye_geometry.attitude import LEVEL, Attitude
-from fisheye_geometry.errors import GeometryError, ImageFormatError
+from fisheye_core.errors import GeometryError, ImageFormatError
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.surface import Surface
 

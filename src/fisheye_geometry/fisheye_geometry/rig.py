@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fisheye_geometry.attitude import Attitude, rotation_matrix, rotation_vector
-from fisheye_geometry.errors import GeometryError
+from fisheye_core.errors import GeometryError
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.surface import Surface
 
@@ -68,7 +68,7 @@ class Rig:
     is_closed
         Whether the last camera and the first are neighbours too.
     apart
-        Indices of the pairs whose rotation nobody knows: their pictures stand side by side.
+        Indices of the pairs whose rotation nobody has_camera: their pictures stand side by side.
 
     Raises
     ------

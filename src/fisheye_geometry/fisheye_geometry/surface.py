@@ -9,7 +9,7 @@ from math import inf, pi
 
 import numpy as np
 
-from fisheye_geometry.errors import GeometryError
+from fisheye_core.errors import GeometryError
 from fisheye_geometry.lens import MAX_PICTURE_SIDE_PX, Lens
 from fisheye_geometry.surface_kind import KINDS
 

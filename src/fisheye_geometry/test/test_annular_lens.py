@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fisheye_geometry.errors import CalibrationError
-from fisheye_geometry.image_circle import SeenLens
+from fisheye_core.errors import CalibrationError
+from fisheye_geometry.image_circle import CircledLens
 from fisheye_geometry.lens import AnnularLens, make_lens
 from fisheye_geometry.surface import surface_for
 
@@ -62,12 +62,12 @@ def test_it_unrolls_to_a_surface_that_leads_all_around():
 
 
 def test_its_picture_is_no_circle_to_look_for():
-    seen = SeenLens(MIRROR)
+    seen = CircledLens(MIRROR)
     picture = np.zeros((400, 480), np.uint8)
     picture[150:250, 200:280] = 200
     assert seen.look(picture)
     assert not seen.look(picture)
-    assert (seen.note, seen.lens) == ('', MIRROR.seen_within(np.pi))
+    assert (seen.note, seen.lens) == ('', MIRROR.with_max_angle(np.pi))
 
 
 def test_the_model_has_a_name():

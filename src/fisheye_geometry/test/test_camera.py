@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fisheye_geometry.camera import IDENTITY, Camera, Readout, camera_from
-from fisheye_geometry.errors import CalibrationError
+from fisheye_core.errors import CalibrationError
 from fisheye_geometry.lens import make_lens
 
 LENS = make_lens(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fisheye_geometry.errors import CalibrationError
+from fisheye_core.errors import CalibrationError
 from fisheye_geometry.lens import make_lens
 
 EXACT_PX = 1e-6
@@ -142,7 +142,7 @@ def test_a_fifth_zero_of_a_fisheye_driver_is_left_out():
 
 
 def test_the_image_circle_limits_what_is_seen():
-    lens = FISHEYE.seen_within(np.radians(60))
+    lens = FISHEYE.with_max_angle(np.radians(60))
     _, seen = lens.project(
         np.array([[np.sin(1.0), 0, np.cos(1.0)], [np.sin(1.1), 0, np.cos(1.1)]])
     )

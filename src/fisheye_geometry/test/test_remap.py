@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fisheye_geometry.errors import GeometryError, ImageFormatError
+from fisheye_core.errors import GeometryError, ImageFormatError
 from fisheye_geometry.lens import make_lens
 from fisheye_geometry.remap import INTERPOLATIONS, RemapTable, Turn, remap_table
 from fisheye_geometry.surface import Surface, surface_for

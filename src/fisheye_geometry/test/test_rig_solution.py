@@ -1,10 +1,10 @@
-"""Solving a rig: measured rotations, mounts in their place, and pairs that nobody knows."""
+"""Solving a rig: measured rotations, mounts in their place, and pairs that nobody has_camera."""
 
 import numpy as np
 import pytest
 
 from fisheye_geometry.attitude import Attitude, angle_between
-from fisheye_geometry.errors import GeometryError
+from fisheye_core.errors import GeometryError
 from fisheye_geometry.lens import make_lens
 from fisheye_geometry.level import Mount
 from fisheye_geometry.rig_solution import solve_rig

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fisheye_geometry.errors import GeometryError
+from fisheye_core.errors import GeometryError
 from fisheye_geometry.lens import make_lens
 from fisheye_geometry.surface import SURFACES, Surface, surface_for
 

@@ -5,7 +5,7 @@ from itertools import compress
 
 import numpy as np
 
-from fisheye_geometry.errors import CalibrationError
+from fisheye_core.errors import CalibrationError
 from fisheye_geometry.lens import FisheyeLens
 from fisheye_undistort.circle_bias import center_bias
 from fisheye_undistort.first_guess import first_guess

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from fisheye_geometry.errors import ImageFormatError, SettingError
+from fisheye_core.errors import ImageFormatError, SettingError
 
 MIN_AREA_PX = 100.0
 MAX_AREA_PX = 10_000.0

@@ -7,8 +7,8 @@ from rclpy.node import Node
 
 from fisheye_bridge.running import spin_until, started
 from fisheye_bridge.topics import ImageSubscription
-from fisheye_geometry.encodings import converted
-from fisheye_geometry.errors import SettingError, SourceError
+from fisheye_core.encodings import converted
+from fisheye_core.errors import SettingError, SourceError
 from fisheye_undistort.collector import Collector
 from fisheye_undistort.pictures import Picture, cut
 

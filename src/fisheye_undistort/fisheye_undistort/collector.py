@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fisheye_geometry.errors import CalibrationError, ImageFormatError
+from fisheye_core.errors import CalibrationError, ImageFormatError
 from fisheye_undistort.detection import Detector
 from fisheye_undistort.lens_fit import View
 from fisheye_undistort.pictures import Picture

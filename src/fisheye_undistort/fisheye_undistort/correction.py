@@ -5,7 +5,7 @@ import numpy as np
 
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.remap import RemapTable
-from fisheye_undistort.settings import UndistortSettings
+from fisheye_undistort.undistort_settings import UndistortSettings
 
 
 class Correction:

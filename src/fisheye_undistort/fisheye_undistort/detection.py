@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from fisheye_geometry.errors import CalibrationError
+from fisheye_core.errors import CalibrationError
 from fisheye_undistort.circle_grid import find_circles
 from fisheye_undistort.grid_order import order_grid
 from fisheye_undistort.lens_fit import View

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from fisheye_geometry.errors import SettingError
+from fisheye_core.errors import SettingError
 
 FORMATS = ('.pdf', '.svg', '.png')
 

@@ -6,7 +6,7 @@ from itertools import count
 import numpy as np
 from scipy.signal import correlate2d
 
-from fisheye_geometry.errors import CalibrationError
+from fisheye_core.errors import CalibrationError
 from fisheye_undistort.circle_grid import Circles
 from fisheye_undistort.target import Target
 

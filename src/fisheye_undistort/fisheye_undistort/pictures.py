@@ -8,9 +8,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from fisheye_geometry.encodings import from_opencv
-from fisheye_geometry.errors import SourceError
-from fisheye_geometry.picture_file import SUFFIXES, is_picture, pictures_in, read_picture
+from fisheye_core.encodings import from_opencv
+from fisheye_core.errors import SourceError
+from fisheye_core.picture_file import SUFFIXES, is_picture, pictures_in, read_picture
 
 HALVES = ('left', 'right')
 

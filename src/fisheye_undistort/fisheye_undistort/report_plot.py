@@ -7,7 +7,7 @@ from textwrap import fill
 import numpy as np
 from matplotlib.figure import Figure
 
-from fisheye_geometry.errors import SettingError
+from fisheye_core.errors import SettingError
 from fisheye_geometry.remap import RemapTable
 from fisheye_geometry.surface import surface_for
 from fisheye_undistort.calibration import Calibration

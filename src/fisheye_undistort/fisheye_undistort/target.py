@@ -6,7 +6,7 @@ from functools import cached_property
 import cv2
 import numpy as np
 
-from fisheye_geometry.errors import SettingError
+from fisheye_core.errors import SettingError
 
 KINDS = ('circles', 'acircles', 'chessboard', 'charuco')
 MARKERS = 'DICT_4X4_250'

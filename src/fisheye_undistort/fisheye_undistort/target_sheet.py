@@ -8,7 +8,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
-from fisheye_geometry.errors import SettingError
+from fisheye_core.errors import SettingError
 from fisheye_undistort.figure_file import check_suffix, write_figure
 from fisheye_undistort.target import Target, marker_dictionary
 

@@ -12,9 +12,9 @@ from fisheye_bridge.parameters import Parameters
 from fisheye_bridge.projection import projection_of
 from fisheye_bridge.qos import IMAGE, LATCHED
 from fisheye_bridge.running import run
-from fisheye_geometry.background import Background
+from fisheye_core.background import Background
 from fisheye_undistort.correction import Correction
-from fisheye_undistort.settings import UndistortSettings
+from fisheye_undistort.undistort_settings import UndistortSettings
 
 
 class UndistortNode(Node):

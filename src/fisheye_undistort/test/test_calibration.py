@@ -6,7 +6,7 @@ import pytest
 from conftest import fisheye, seen_exactly
 from rendered_view import facing_pose, render_view, scattered_poses
 
-from fisheye_geometry.errors import CalibrationError
+from fisheye_core.errors import CalibrationError
 from fisheye_geometry.surface import surface_for
 from fisheye_undistort.calibration import calibrate
 from fisheye_undistort.circle_bias import center_bias

@@ -4,7 +4,7 @@ import pytest
 from conftest import fisheye
 from rendered_view import Look, facing_pose, render_view
 
-from fisheye_geometry.errors import ImageFormatError, SettingError
+from fisheye_core.errors import ImageFormatError, SettingError
 from fisheye_undistort.circle_grid import area_limits, find_circles
 from fisheye_undistort.grid_order import order_grid
 from fisheye_undistort.target import STANDARD

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from fisheye_geometry.errors import CalibrationError, ImageFormatError
+from fisheye_core.errors import CalibrationError, ImageFormatError
 from fisheye_undistort.collector import Collector
 from fisheye_undistort.lens_fit import View
 from fisheye_undistort.pictures import Picture

@@ -3,7 +3,7 @@ import pytest
 from conftest import fisheye, seen_exactly
 from rendered_view import Look, facing_pose, render_view, scattered_poses
 
-from fisheye_geometry.errors import CalibrationError
+from fisheye_core.errors import CalibrationError
 from fisheye_undistort.calibration import calibrate
 from fisheye_undistort.detection import Detector
 from fisheye_undistort.target import STANDARD, Target

@@ -5,7 +5,7 @@ import pytest
 from conftest import fisheye
 from rendered_view import facing_pose, scattered_poses
 
-from fisheye_geometry.errors import CalibrationError
+from fisheye_core.errors import CalibrationError
 from fisheye_undistort.circle_grid import Circles, find_circles
 from fisheye_undistort.grid_order import order_grid
 from fisheye_undistort.target import STANDARD, Target

@@ -5,7 +5,7 @@ import pytest
 from conftest import seen_exactly
 from rendered_view import facing_pose, scattered_poses
 
-from fisheye_geometry.errors import SettingError
+from fisheye_core.errors import SettingError
 from fisheye_undistort.calibration import calibrate
 from fisheye_undistort.lens_fit import View
 from fisheye_undistort.report import Report

@@ -2,7 +2,7 @@ import cv2
 import numpy as np
 import pytest
 
-from fisheye_geometry.errors import SettingError
+from fisheye_core.errors import SettingError
 from fisheye_undistort.target import KINDS, STANDARD, Target, marker_dictionary
 
 

@@ -5,7 +5,7 @@ import cv2
 import numpy as np
 import pytest
 
-from fisheye_geometry.errors import SettingError
+from fisheye_core.errors import SettingError
 from fisheye_undistort.detection import Detector
 from fisheye_undistort.target import KINDS, STANDARD, Target
 from fisheye_undistort.target_sheet import paper_for, sheet_picture, write_sheet

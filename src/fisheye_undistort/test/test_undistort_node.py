@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import rclpy
 from fisheye_msgs.msg import Projection
-from image_message import to_message
+from fisheye_testing.image_message import to_message
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -21,7 +21,7 @@ from fisheye_bridge.projection import surface_of
 from fisheye_bridge.qos import IMAGE, LATCHED
 from fisheye_geometry.camera_file import Camera
 from fisheye_geometry.lens import make_lens
-from fisheye_undistort.settings import UndistortSettings
+from fisheye_undistort.undistort_settings import UndistortSettings
 from fisheye_undistort.undistort_node import UndistortNode
 
 DEADLINE_S = 10.0

@@ -17,8 +17,8 @@ from ament_index_python.packages import (
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironmentVariable
 from launch_ros.actions import Node, SetParameter
 
-from fisheye_geometry.errors import CameraFileError
-from fisheye_geometry.yaml_file import read_mapping
+from fisheye_core.errors import CameraFileError
+from fisheye_core.yaml_file import read_mapping
 from launch import LaunchDescription, logging
 
 CONFIG = Path(get_package_share_directory('panorama_stitch')) / 'config'
@@ -60,7 +60,7 @@ def start(context):
 
 
 def check_names(words):
-    """Refuse arguments of the command line that nobody knows."""
+    """Refuse arguments of the command line that nobody has_camera."""
     if not any(Path(word).name == Path(__file__).name for word in sys.argv):
         return  # another file includes this one, and may have arguments of its own
     for name in (word.partition(':=')[0] for word in words):

@@ -16,7 +16,7 @@ from fisheye_geometry.surface import Surface, surface_for
 from panorama_stitch.compose.placing import place
 from panorama_stitch.compose.posing import views_at_overlaps
 from panorama_stitch.compose.view import View
-from panorama_stitch.overlap_result import Overlap
+from panorama_stitch.overlap.overlap_result import Overlap
 
 DATA = Path(os.environ.get('FISHEYE_DATA', ''))
 YAW_DEG = 140.0
@@ -115,7 +115,7 @@ def real_views(name: str, kind: str = 'cylindrical', turn: Turn = LEVEL):
         picture = cv2.imread(str(folder / f'{side}.png'), cv2.IMREAD_GRAYSCALE)
         circle = ImageCircle(camera)
         circle.look(picture)
-        camera = camera.seen_within(circle.angle_rad)
+        camera = camera.with_max_angle(circle.angle_rad)
         surface = surface_for(camera, kind)
         if surfaces:
             surface = surface.with_focal(surfaces[0].focal_px)

@@ -5,10 +5,10 @@ import pytest
 from scenes import exposed, pair, tilted
 
 from fisheye_geometry.remap import Turn
-from panorama_stitch.alignment import align, certainty, refine
-from panorama_stitch.particles import facing_halves
-from panorama_stitch.pose import Pose
-from panorama_stitch.structure import face
+from panorama_stitch.overlap.alignment import align, overlap_score, refine
+from panorama_stitch.overlap.particles import facing_halves
+from panorama_stitch.overlap.pose import Pose
+from panorama_stitch.overlap.structure import face
 
 COARSE_DEG = 0.2
 """Error of a pose found at 2 px per degree."""
@@ -36,7 +36,7 @@ def test_finds_a_turn_from_an_offset_that_is_a_little_off(kind, turn):
     assert degrees(pose.roll_rad - turn.roll_rad) == pytest.approx(0, abs=2 * COARSE_DEG)
     error_px = pose.x_px - true_px / coarse.step
     assert error_px / coarse.px_per_deg == pytest.approx(0, abs=COARSE_DEG)
-    assert certainty(coarse, pose) > certainty(coarse, start)
+    assert overlap_score(coarse, pose) > overlap_score(coarse, start)
 
     fine = facing_pair((left, right), surfaces, 4.0)
     pose = refine(fine, pose.scaled(coarse.step / fine.step), tilt=True)
@@ -61,12 +61,12 @@ def test_certainty_of_a_wrong_offset_is_low():
     views, surfaces, true_px = pair()
     facing = facing_pair(views, surfaces, 2.0)
     x = (true_px - surfaces[0].width + surfaces[0].width // 2) / facing.step
-    assert certainty(facing, Pose(x, 0.0)) > 0.8
-    assert certainty(facing, Pose(x - 30, 0.0)) < 0.3
-    assert certainty(facing, Pose(1e4, 0.0)) == 0.0
+    assert overlap_score(facing, Pose(x, 0.0)) > 0.8
+    assert overlap_score(facing, Pose(x - 30, 0.0)) < 0.3
+    assert overlap_score(facing, Pose(1e4, 0.0)) == 0.0
 
 
 def test_flat_pictures_have_no_certainty():
     (left, right), surfaces, _ = pair()
     flat = tuple(np.where(view > 0, 128, 0).astype(np.uint8) for view in (left, right))
-    assert certainty(facing_pair(flat, surfaces, 2.0), Pose(50.0, 0.0)) == 0.0
+    assert overlap_score(facing_pair(flat, surfaces, 2.0), Pose(50.0, 0.0)) == 0.0

@@ -10,7 +10,7 @@ from scenes import placed_at
 
 from fisheye_capture.scene import Scene
 from fisheye_geometry.attitude import LEVEL
-from fisheye_geometry.errors import ImageFormatError
+from fisheye_core.errors import ImageFormatError
 from fisheye_geometry.lens import make_lens
 from fisheye_geometry.remap import Turn
 from fisheye_geometry.surface import surface_for
@@ -20,7 +20,7 @@ from panorama_stitch.compose.layout import covered, lay_out
 from panorama_stitch.compose.placing import place
 from panorama_stitch.compose.posing import views_at_overlaps
 from panorama_stitch.compose.view import View
-from panorama_stitch.overlap_result import Overlap
+from panorama_stitch.overlap.overlap_result import Overlap
 
 YAW = np.radians(140)
 STAMP_NS = 700_000_000
@@ -32,7 +32,7 @@ LENS = make_lens(
     240,
     [111.526, 0, 159.5, 0, 111.526, 119.5, 0, 0, 1],
     [-0.02, 0.004, -0.001, 0.0001],
-).seen_within(np.radians(92))
+).with_max_angle(np.radians(92))
 SMALL_OBJECTS_BYTES = 20_000
 """Slices and the like, a fiftieth of a small panorama; they are freed at once."""
 SURFACE = surface_for(LENS)

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from scenes import pair
 
-from panorama_stitch.correlation import Landscape, correlate
-from panorama_stitch.particles import facing_halves
-from panorama_stitch.structure import face
+from panorama_stitch.overlap.correlation import ScoreMap, correlate
+from panorama_stitch.overlap.particles import facing_halves
+from panorama_stitch.overlap.structure import face
 
 RISE = range(-6, 7)
 
@@ -46,7 +46,7 @@ def test_a_slope_at_the_rim_is_no_peak():
     score = np.zeros((5, 40), np.float32)
     score[0, 10] = 0.9
     score[2, 30] = 0.5
-    landscape = Landscape(np.arange(40), np.arange(5), score)
+    landscape = ScoreMap(np.arange(40), np.arange(5), score)
     assert landscape.peaks(3, apart_px=4) == [(30, 2)]
     assert landscape.best_near(10, 0, within_px=1)[1] > 0
 
@@ -54,5 +54,5 @@ def test_a_slope_at_the_rim_is_no_peak():
 def test_peaks_are_apart():
     score = np.zeros((3, 40), np.float32)
     score[1, [10, 12, 25]] = 0.9, 0.8, 0.7
-    landscape = Landscape(np.arange(40), np.arange(3), score)
+    landscape = ScoreMap(np.arange(40), np.arange(3), score)
     assert [x for x, _ in landscape.peaks(5, apart_px=4)] == [10, 25]

@@ -12,10 +12,10 @@ import pytest
 from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.attitude import Attitude
-from fisheye_geometry.errors import FisheyeError
-from fisheye_geometry.settings import rules
-from panorama_stitch.settings import PanoramaSettings, StitchSettings
-from panorama_stitch.stitcher import Stitcher
+from fisheye_core.errors import FisheyeError
+from fisheye_core.settings import rules
+from panorama_stitch.pipeline.panorama_settings import PanoramaSettings, StitchSettings
+from panorama_stitch.pipeline.rig_state import RigState
 
 CHANGES = 5000 if os.environ.get('LONG') else 1000
 LENS = synthetic_lens(96, 72, np.radians(170))
@@ -33,7 +33,7 @@ def pictures():
 
 
 def stitcher_of(pictures, settings):
-    stitcher = Stitcher(settings.cameras)
+    stitcher = RigState(settings.cameras)
     place(stitcher, settings)
     stitcher.overlaps = stitcher.measure([pictures], settings, 'correlation')
     return stitcher
@@ -103,7 +103,7 @@ def test_a_hard_seam_of_round_pictures_keeps_their_rows():
     lens = replace(synthetic_lens(240, 240, np.radians(190)), visible_angle_rad=np.radians(95))
     views = [Scene().view(lens, Attitude(yaw_rad=yaw)) for yaw in (-YAW / 2, YAW / 2)]
     pictures, heights = [view.frame(0) for view in views], {}
-    stitcher, settings = Stitcher(('left', 'right')), PanoramaSettings()
+    stitcher, settings = RigState(('left', 'right')), PanoramaSettings()
     for camera in stitcher.cameras:
         stitcher.place(camera, lens, settings.surface_of(lens))
     stitcher.overlaps = stitcher.measure([pictures], settings, 'correlation')

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from fisheye_geometry.errors import ImageFormatError, SourceError
+from fisheye_core.errors import ImageFormatError, SourceError
 from panorama_stitch.compose.mask import read_mask
 
 

@@ -20,12 +20,12 @@ from scenes import (
     world,
 )
 
-from fisheye_geometry.errors import OverlapError
+from fisheye_core.errors import OverlapError
 from fisheye_geometry.remap import LEVEL, Turn
 from fisheye_geometry.surface import SURFACES, Surface, surface_for
-from panorama_stitch import registration
-from panorama_stitch.overlap_measurement import METHODS, OverlapSettings, measure_overlap
-from panorama_stitch.proposals import Proposals
+from panorama_stitch.overlap import registration
+from panorama_stitch.overlap.measure_overlap import METHODS, OverlapSettings, measure_overlap
+from panorama_stitch.overlap.proposals import Proposals
 
 SETTINGS = OverlapSettings()
 ONE_PX = 1.0

@@ -8,12 +8,12 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fisheye_geometry.errors import CameraFileError
+from fisheye_core.errors import CameraFileError
 from fisheye_geometry.remap import Turn
 from fisheye_geometry.surface import Surface
-from panorama_stitch.overlap_file import read_overlaps, write_overlaps
-from panorama_stitch.overlap_result import Overlap
-from panorama_stitch.particles import Particle
+from panorama_stitch.overlap.overlap_file import read_overlaps, write_overlaps
+from panorama_stitch.overlap.overlap_result import Overlap
+from panorama_stitch.overlap.particles import Particle
 
 CAMERAS = ('left', 'middle', 'right')
 SURFACES = tuple(

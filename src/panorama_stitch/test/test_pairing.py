@@ -1,11 +1,11 @@
 """Pairing: right partners, whatever the order, and never more memory than agreed."""
 
 import pytest
-from free_running import Camera, pair
+from fisheye_testing.free_running import Camera, pair
 from hypothesis import given
 from hypothesis import strategies as st
 
-from panorama_stitch.pairing import FramePairing
+from panorama_stitch.pipeline.pairing import FramePairing
 
 MS = 1_000_000
 PERIOD = 33 * MS

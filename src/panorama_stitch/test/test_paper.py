@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from panorama_stitch.paper import (
+from panorama_stitch.overlap.paper import (
     find_match,
     match_particles,
     mean_differences,
     offset_x,
     paper_particles,
 )
-from panorama_stitch.particles import Particle
+from panorama_stitch.overlap.particles import Particle
 
 LEFT = Particle(106.07, 170.12, 79, 115, 0, 115, 230, 217, 18974, 32.06)
 RIGHT_A = Particle(160.59, 31.95, 4, 0, 4, 0, 263, 111, 12259, 20.72)

@@ -2,7 +2,7 @@ import cv2
 import numpy as np
 import pytest
 
-from panorama_stitch.particles import (
+from panorama_stitch.overlap.particles import (
     analyse,
     cluster_thresholds,
     facing_halves,

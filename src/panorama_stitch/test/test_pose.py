@@ -6,7 +6,7 @@ from scenes import lens
 
 from fisheye_geometry.remap import RemapTable
 from fisheye_geometry.surface import surface_for
-from panorama_stitch.pose import Pose
+from panorama_stitch.overlap.pose import Pose
 
 
 @pytest.mark.parametrize('kind', ['cylindrical', 'equirectangular'])

@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 from scenes import exposed, pair
 
-from panorama_stitch.correlation import Landscape, correlate
-from panorama_stitch.particles import facing_halves
-from panorama_stitch.proposals import propose
-from panorama_stitch.structure import face
+from panorama_stitch.overlap.correlation import ScoreMap, correlate
+from panorama_stitch.overlap.particles import facing_halves
+from panorama_stitch.overlap.proposals import propose
+from panorama_stitch.overlap.structure import face
 
 
 def facing_pair(views, surfaces):
@@ -45,6 +45,6 @@ def test_flat_pictures_propose_nothing():
     (left, right), surfaces, _ = pair()
     flat = tuple(np.where(view > 0, 128, 0).astype(np.uint8) for view in (left, right))
     proposals = propose(facing_pair(flat, surfaces), max_rise_px=8)
-    empty = Landscape(np.arange(9), np.arange(5), np.zeros((5, 9), np.float32))
+    empty = ScoreMap(np.arange(9), np.arange(5), np.zeros((5, 9), np.float32))
     assert proposals.offsets(empty, 8) == []
     assert proposals.match_at(0, 0) == (-1, -1)

@@ -28,7 +28,7 @@ SEAMLESS = 1.5
 """How much more the columns beside the edge of a closed panorama may differ than others do."""
 STAMP_NS = 700_000_000
 FISHEYE = synthetic_lens(320, 240, np.radians(170))
-WIDE = synthetic_lens(400, 400, np.radians(200)).seen_within(np.radians(100))
+WIDE = synthetic_lens(400, 400, np.radians(200)).with_max_angle(np.radians(100))
 SMALL = synthetic_lens(240, 180, np.radians(160))
 PLAIN = make_lens('plumb_bob', 240, 180, [148.2, 0, 119.5, 0, 148.2, 89.5, 0, 0, 1], [])
 """78 degrees across."""

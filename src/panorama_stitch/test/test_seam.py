@@ -7,7 +7,7 @@ from scenes import placed_at
 from fisheye_geometry.lens import make_lens
 from fisheye_geometry.surface import surface_for
 from panorama_stitch.compose.layout import lay_out
-from panorama_stitch.compose.seam import settle_seams
+from panorama_stitch.compose.seam import optimise_seams
 from panorama_stitch.compose.view import View
 
 SURFACE = surface_for(make_lens('plumb_bob', 200, 120, [150, 0, 99.5, 0, 150, 59.5, 0, 0, 1], []))
@@ -31,7 +31,7 @@ def frames():
 def settled(images, views=VIEWS, fade_px=FADE_PX):
     placed = placed_at(views, (OFFSET_PX, 0))
     layout = lay_out(placed, fade_px=fade_px, crop='none')
-    return layout, settle_seams(layout, placed, images)
+    return layout, optimise_seams(layout, placed, images)
 
 
 def test_where_the_views_agree_everywhere_it_stays_in_the_middle():

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scenes import exposed, lens, masked, pair, world
 
-from panorama_stitch.structure import face, structure
+from panorama_stitch.overlap.structure import face, structure
 
 STRONG = 1.0
 """Standard deviation of the structure of a scene full of things, about."""

@@ -12,7 +12,7 @@ from typing import Any
 
 from aiohttp import web
 
-from fisheye_geometry.errors import SettingError
+from fisheye_core.errors import SettingError
 from panorama_viewer.address import reachable, refusal
 from panorama_viewer.faults import Faults
 from panorama_viewer.gate import Gate

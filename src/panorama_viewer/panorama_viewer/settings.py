@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from fisheye_geometry.settings import setting
+from fisheye_core.settings import setting
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import Any
 
 from aiohttp import WSCloseCode, web
 
-from fisheye_geometry.errors import FisheyeError
+from fisheye_core.errors import FisheyeError
 from panorama_viewer.address import is_loopback
 from panorama_viewer.audience import Audience
 from panorama_viewer.browser import Browser, Picture, dismiss
@@ -120,7 +120,7 @@ class Site:
             sentence = 'looking needs the token that was printed when the viewer started'
             await dismiss(stream, connection, WSCloseCode.POLICY_VIOLATION, sentence)
             return stream
-        is_known = self._guard.knows(request)
+        is_known = self._guard.has_camera(request)
         browser = Browser(stream, connection, lambda: self._state, self._fresh, is_known=is_known)
         if not self.browsers.enter(browser):
             sentence = f'{len(self.browsers)} browsers look already, which is the limit'
@@ -155,7 +155,7 @@ class Site:
         """Refuse who may not press it, and give who may the time for it."""
         self._guard.check_token(request)
         connection = self._gate.connection(request)
-        if self._guard.knows(request):
+        if self._guard.has_camera(request):
             self._gate.know(connection)
         connection.set_deadline(seconds)
 

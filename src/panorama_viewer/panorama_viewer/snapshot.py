@@ -13,7 +13,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from fisheye_geometry.errors import SettingError
+from fisheye_core.errors import SettingError
 from fisheye_geometry.remap import RemapTable
 from fisheye_geometry.surface import Surface
 from panorama_viewer.projection import described

@@ -14,8 +14,8 @@ from fisheye_bridge.qos import LATCHED
 from fisheye_bridge.running import spin_until, started
 from fisheye_bridge.stamps import ns_of
 from fisheye_bridge.topics import ImageSubscription
-from fisheye_geometry.encodings import to_opencv
-from fisheye_geometry.errors import FisheyeError, SettingError, SourceError
+from fisheye_core.encodings import to_opencv
+from fisheye_core.errors import FisheyeError, SettingError, SourceError
 from panorama_viewer.snapshot import FORMATS, save
 
 

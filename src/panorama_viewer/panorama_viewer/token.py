@@ -6,7 +6,7 @@ import secrets
 import stat
 from pathlib import Path
 
-from fisheye_geometry.errors import SettingError
+from fisheye_core.errors import SettingError
 
 _LONGEST = 200
 _TOKEN = re.compile(r'[\w-]{8,100}', re.ASCII)

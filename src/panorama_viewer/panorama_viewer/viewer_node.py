@@ -18,7 +18,7 @@ from fisheye_bridge.projection import surface_of
 from fisheye_bridge.qos import IMAGE_INPUT, LATCHED
 from fisheye_bridge.running import run
 from fisheye_bridge.stamps import ns_of
-from fisheye_geometry.errors import FisheyeError, OverlapError
+from fisheye_core.errors import FisheyeError, OverlapError
 from panorama_viewer.projection import described
 from panorama_viewer.server import ViewerServer
 from panorama_viewer.settings import ViewerSettings

@@ -13,8 +13,9 @@ import aiohttp
 import pytest
 from serving import DEADLINE_S, address, here, picture, request, state, visit
 
-from fisheye_geometry.errors import SettingError
-from panorama_viewer import browser, connection
+from fisheye_core.errors import SettingError
+from panorama_viewer import browser
+from panorama_viewer import connection
 from panorama_viewer.token import kept_token
 
 REFUSED, LATER = 1008, 1013

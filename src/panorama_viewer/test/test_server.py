@@ -9,7 +9,7 @@ import pytest
 from serving import DEADLINE_S, address, answered, picture, request, state, visit
 
 import panorama_viewer
-from fisheye_geometry.errors import OverlapError, SettingError
+from fisheye_core.errors import OverlapError, SettingError
 from panorama_viewer.server import ViewerServer
 from panorama_viewer.settings import ViewerSettings
 

@@ -8,7 +8,7 @@ import pytest
 from fisheye_msgs.msg import Projection
 
 from fisheye_bridge.projection import surface_of
-from fisheye_geometry.errors import SettingError
+from fisheye_core.errors import SettingError
 from fisheye_geometry.surface import Surface
 from panorama_viewer.snapshot import gpano, on_sphere, save
 

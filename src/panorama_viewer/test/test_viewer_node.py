@@ -23,7 +23,7 @@ from sensor_msgs.msg import CompressedImage
 
 from fisheye_bridge.qos import IMAGE, LATCHED
 from fisheye_bridge.stamps import stamp_of
-from fisheye_geometry.errors import SettingError
+from fisheye_core.errors import SettingError
 from panorama_viewer import viewer_node
 from panorama_viewer.viewer_node import ViewerNode
 

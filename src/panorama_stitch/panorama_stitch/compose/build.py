@@ -9,7 +9,7 @@ from panorama_stitch.compose.compositor import BLENDS, Compositor
 from panorama_stitch.compose.gain import GainCompensation
 from panorama_stitch.compose.layout import lay_out
 from panorama_stitch.compose.placing import place
-from panorama_stitch.compose.seam import settle_seams
+from panorama_stitch.compose.seam import optimise_seams
 from panorama_stitch.compose.view import View
 
 
@@ -60,7 +60,7 @@ def build_compositor(
     placed = place(views, wraps=wraps)
     fade_px = style.fade_rad * placed.surface.focal_px * BLENDS[style.blend]
     layout = lay_out(placed, fade_px=fade_px, crop=style.crop)
-    layout = settle_seams(layout, placed, group)
+    layout = optimise_seams(layout, placed, group)
     gain = None
     if style.is_gain_compensated and layout.seams:
         gain = GainCompensation(layout, placed, group)

@@ -13,7 +13,7 @@ from panorama_stitch.compose.fade import Fade
 from panorama_stitch.compose.flow import Flow
 from panorama_stitch.compose.gain import GainCompensation
 from panorama_stitch.compose.layout import Layout, neighbours, wrapped
-from panorama_stitch.compose.parallel import share
+from fisheye_core.parallel import run_parallel
 from panorama_stitch.compose.placing import Placed, PlacedView
 from panorama_stitch.compose.view import Cut
 
@@ -68,7 +68,7 @@ class Compositor:
         edges = np.linspace(0, layout.surface.height, count + 1)
         slabs = [slice(*rows) for rows in pairwise(edges.round().astype(int))]
         self._parts: list[list[_Part]] = [[] for _ in slabs]
-        share(
+        run_parallel(
             [
                 partial(self._prepare, placed, parts, rows)
                 for parts, rows in zip(self._parts, slabs, strict=True)
@@ -108,7 +108,7 @@ class Compositor:
             gain.update(images)
         for fade in self._fades:
             fade.expect(out)
-        share([partial(self._draw, parts, images, out, gain) for parts in self._parts])
+        run_parallel([partial(self._draw, parts, images, out, gain) for parts in self._parts])
         for fade in self._fades:
             if not fade.is_local:
                 fade.blend(_ALL_ROWS, out, economical=economical or not are_live)

@@ -12,7 +12,7 @@ import numpy as np
 
 from panorama_stitch.compose.blend import Feather
 from panorama_stitch.compose.optical_flow import OpticalFlow
-from panorama_stitch.compose.parallel import share
+from fisheye_core.parallel import run_parallel
 
 _ROUNDS = 3
 """Of the fixed point that finds what part of a view comes to lie at a pixel."""
@@ -93,7 +93,7 @@ class Flow:
         strength *= self._strength
         ours, theirs = self._left, self._right
         there, back = self._flow.flows
-        share(
+        run_parallel(
             [
                 lambda: ours.draw(left, there, strength),
                 lambda: theirs.draw(right, back, strength),

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from fisheye_geometry.errors import ImageFormatError
-from fisheye_geometry.picture_file import read_picture
+from fisheye_core.errors import ImageFormatError
+from fisheye_core.picture_file import read_picture
 
 _WHITE = 128
 """Grey level from which on a pixel of a mask is white."""

@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from panorama_stitch.compose.parallel import share
+from fisheye_core.parallel import run_parallel
 
 _COLUMNS = 56
 """Views are reduced to so many columns, half of those of 30 degrees from 640x480 px."""
@@ -68,7 +68,7 @@ class OpticalFlow:
     def follow(self, left: np.ndarray, right: np.ndarray) -> None:
         """Follow the next views (height, width[, channels]) uint8."""
         ours, theirs = self._views
-        share([lambda: ours.look(left), lambda: theirs.look(right)])
+        run_parallel([lambda: ours.look(left), lambda: theirs.look(right)])
         if not self._is_first:
             change = np.maximum(ours.change, theirs.change, out=ours.change)
             change -= _STILL
@@ -76,7 +76,7 @@ class OpticalFlow:
             np.clip(change, _STEADY, 1, out=change)
             cv2.merge([change, change], dst=self._weight)
         self._is_first = False
-        share(
+        run_parallel(
             [
                 lambda: ours.follow(theirs, self._weight),
                 lambda: theirs.follow(ours, self._weight),

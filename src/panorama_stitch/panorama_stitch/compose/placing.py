@@ -7,11 +7,11 @@ from math import inf, pi
 
 import numpy as np
 
-from fisheye_geometry.errors import GeometryError
+from fisheye_core.errors import GeometryError
 from fisheye_geometry.rig import unwrapped
 from fisheye_geometry.surface import Surface
 from fisheye_geometry.surface_kind import KINDS
-from panorama_stitch.compose.parallel import share
+from fisheye_core.parallel import run_parallel
 from panorama_stitch.compose.view import Cut, View, shown
 
 _WIDEST_STEP_RAD = np.radians(210)
@@ -143,7 +143,7 @@ def place(views: Sequence[View], *, wraps: bool = False) -> Placed:
             each.begin, each.end = max(each.begin, left) - left, min(each.end, right) - left
             each.axis -= left
     surface = grid.window(left, top, right - left, bottom - top)
-    share([partial(each.prepare, surface) for each in placed])
+    run_parallel([partial(each.prepare, surface) for each in placed])
     return Placed(surface, tuple(placed), wraps)
 
 

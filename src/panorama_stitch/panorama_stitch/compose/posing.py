@@ -10,7 +10,7 @@ from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.rig import Rig
 from fisheye_geometry.surface import Surface
 from panorama_stitch.compose.view import View
-from panorama_stitch.overlap_result import Overlap, apart_rad
+from panorama_stitch.overlap.overlap_result import Overlap, yaw_between_rad
 
 
 def views_of_rig(
@@ -66,7 +66,7 @@ def views_at_overlaps(views: Sequence[View], overlaps: Sequence[Overlap]) -> lis
     yaws, shifts = [0.0], [np.zeros(2)]
     top_px = 0.0
     for left, right, overlap in zip(views[:-1], views[1:], overlaps, strict=True):
-        step_rad = apart_rad(overlap.offset_x_px, left.surface, right.surface)
+        step_rad = yaw_between_rad(overlap.offset_x_px, left.surface, right.surface)
         is_turn = overlap.found and left.surface.yaw_is_column_shift
         top_px += overlap.offset_y_px
         beside_px = overlap.offset_x_px + right.surface.center_x_px - left.surface.center_x_px

@@ -17,7 +17,7 @@ _SHOWN_SHARE = 0.98
 """A seam shows at least so much of both views as one in the middle of the overlap."""
 
 
-def settle_seams(layout: Layout, placed: Placed, group: Sequence[np.ndarray]) -> Layout:
+def optimise_seams(layout: Layout, placed: Placed, group: Sequence[np.ndarray]) -> Layout:
     """Move each seam within its overlap to where the views differ least.
 
     The sides of a lens are its worst part, so that towards the edge of the overlap they have to

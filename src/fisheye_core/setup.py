@@ -1,0 +1,15 @@
+from setuptools import setup
+
+package_name = 'fisheye_core'
+
+setup(
+    name=package_name,
+    version='0.2.0',
+    packages=[package_name],
+    package_data={package_name: ['py.typed']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
+        (f'share/{package_name}', ['package.xml']),
+    ],
+    extras_require={'test': ['pytest']},
+)

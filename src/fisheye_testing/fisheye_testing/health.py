@@ -1,0 +1,122 @@
+"""How a rig fares: when its panorama was whole, what its nodes say, what they use."""
+
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from fisheye_testing.rig import wait_for
+from fisheye_testing.watcher import Watcher
+
+from fisheye_bridge.images import to_array
+
+_BRIGHT_SHARE = 0.7
+"""A side darker than this share of its usual level is dimmed."""
+_LONG_GAP_S = 0.4
+"""Between two panoramas; shorter ones are the breath of a busy machine."""
+_STEP_PX = 8
+_START_S = 60.0
+
+
+class Seen(NamedTuple):
+    """A panorama that came.
+
+    Attributes
+    ----------
+    arrived_s
+        On the monotonic clock.
+    stamp_ns
+        Of its message.
+    levels
+        Mean grey levels of its left and of its right quarter.
+    """
+
+    arrived_s: float
+    stamp_ns: int
+    levels: tuple[float, float]
+
+
+class Health(Watcher):
+    """A watcher that remembers how every panorama looked, and the last word of every node.
+
+    Attributes
+    ----------
+    seen : list of Seen
+        Every panorama since `settle`.
+    status : dict
+        `DiagnosticStatus` by the node's name, as `left/capture`.
+    """
+
+    def __init__(self, domain: int, namespace: str = ''):
+        self.seen: list[Seen] = []
+        self.status: dict[str, DiagnosticStatus] = {}
+        self._usual = None
+        super().__init__(domain, namespace)
+        self.node.create_subscription(DiagnosticArray, '/diagnostics', self._take_status, 50)
+
+    def settle(self) -> None:
+        """Wait until panoramas come steadily, and take what they show for the usual."""
+        self._usual = None
+        self.seen = []
+
+        def steady():
+            levels = np.array([entry.levels for entry in self.seen[-15:]])
+            return len(levels) == 15 and (np.ptp(levels, axis=0) < 5).all()
+
+        wait_for(steady, _START_S, 'a steady panorama')
+        self._usual = np.array(self.seen[-1].levels)
+
+    def is_dim(self, entry: Seen) -> tuple[bool, bool]:
+        """Whether the left and the right side of a panorama are dimmed."""
+        return tuple(np.array(entry.levels) < _BRIGHT_SHARE * self._usual)
+
+    def whole(self, since_s: float) -> bool:
+        """Whether a panorama with both sides live came since a time."""
+        return any(e.arrived_s > since_s and not any(self.is_dim(e)) for e in self.seen[-5:])
+
+    def suffering(self, begin_s: float) -> tuple[float, float, float]:
+        """How long no panorama came, the left and the right side were dim since a time, s."""
+        entries = [entry for entry in self.seen if entry.arrived_s >= begin_s - _LONG_GAP_S]
+        arrivals = np.array([entry.arrived_s for entry in entries] + [time.monotonic()])
+        gaps = np.diff(arrivals)
+        dim = np.array([self.is_dim(entry) for entry in entries])
+        shown = np.minimum(gaps, _LONG_GAP_S)
+        left, right = shown @ dim
+        return float(gaps[gaps > _LONG_GAP_S].sum()), float(left), float(right)
+
+    def level(self, node: str) -> bytes:
+        """Give the last level of a node in /diagnostics; STALE where there is none."""
+        return self.status[node].level if node in self.status else DiagnosticStatus.STALE
+
+    def value(self, node: str, key: str) -> str | None:
+        """Give a value of a node's last diagnostics, None where there is none."""
+        entries = self.status[node].values if node in self.status else ()
+        return next((entry.value for entry in entries if entry.key == key), None)
+
+    def _take(self, message) -> None:
+        super()._take(message)
+        image = to_array(message)[0][::_STEP_PX, ::_STEP_PX]
+        quarter = image.shape[1] // 4
+        levels = float(image[:, :quarter].mean()), float(image[:, -quarter:].mean())
+        self.seen.append(Seen(time.monotonic(), self.stamps_ns[-1], levels))
+
+    def _take_status(self, message) -> None:
+        self.status.update({status.name: status for status in message.status})
+
+
+class Usage(NamedTuple):
+    """What a process uses; of its resident memory, what it shares with others apart."""
+
+    resident_mib: float
+    shared_mib: float
+    files: int
+    threads: int
+
+
+def usage(pid: int) -> Usage:
+    """Give what a process uses now."""
+    folder = Path(f'/proc/{pid}')
+    resident, shared = (int(pages) / 256 for pages in (folder / 'statm').read_text().split()[1:3])
+    files, threads = (len(list((folder / part).iterdir())) for part in ('fd', 'task'))
+    return Usage(resident, shared, files, threads)

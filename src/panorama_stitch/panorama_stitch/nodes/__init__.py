@@ -1,0 +1,1 @@
+"""The ROS nodes: stitch_node, panorama_node, and base_node, what both share."""

@@ -1,0 +1,226 @@
+"""The overlap of two neighbouring cameras, measured once on what they see.
+
+Particles, or the full search, propose offsets; each is verified by correlating the structure of
+the overlap tile by tile, and the winner is refined to a fraction of a pixel.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import isnan, nan, radians
+
+import cv2
+import numpy as np
+
+from fisheye_core.errors import OverlapError
+from fisheye_geometry.surface import Surface
+from panorama_stitch.overlap import wording as overlap_words
+from panorama_stitch.overlap import paper
+from panorama_stitch.overlap.overlap_result import Overlap, side_by_side
+from panorama_stitch.overlap.overlap_settings import METHODS, OverlapSettings
+from panorama_stitch.overlap.particles import Particle
+from panorama_stitch.overlap.registration import Registration, Search, fit_at, register
+
+_SMALLEST_PX = 32
+"""Sides of a picture that can hold an overlap."""
+_FOCAL_TOLERANCE = 1e-3
+"""Relative difference of the focal lengths that moves a whole picture by less than a pixel."""
+
+
+def measure_overlap(
+    pairs: Sequence[tuple[np.ndarray, np.ndarray]],
+    surface_left: Surface,
+    surface_right: Surface,
+    settings: OverlapSettings,
+    method: str | None = None,
+) -> Overlap:
+    """Measure the overlap of two neighbouring cameras.
+
+    Parameters
+    ----------
+    pairs
+        One or more (left, right) corrected pictures (height, width[, channels]) uint8, 0 exactly
+        where the lens sees nothing. Of several the median decides, so that somebody who walks
+        through does not.
+    surface_left, surface_right
+        What they are on; of one kind and one focal length.
+    settings
+        How to measure.
+    method
+        One of `METHODS`; None: as the settings say.
+
+    Raises
+    ------
+    OverlapError
+        If a picture is missing or fits its surface not, or the surfaces do not fit together.
+    """
+    method = method or settings.method
+    _check(pairs, surface_left, surface_right, method)
+    overlaps = [
+        _Measurement(left, right, surface_left, surface_right, settings).run(method)
+        for left, right in pairs
+    ]
+    found = sorted((o for o in overlaps if o.found), key=lambda o: o.offset_x_px)
+    if 2 * len(found) <= len(overlaps):
+        return max((o for o in overlaps if not o.found), key=lambda o: o.confidence)
+    return found[len(found) // 2]
+
+
+def _check(pairs, surface_left, surface_right, method) -> None:
+    if method not in METHODS:
+        raise OverlapError(f"method '{method}' is not known; expected one of {', '.join(METHODS)}")
+    if not pairs:
+        raise OverlapError('no pair of pictures was given; expected at least one')
+    if surface_left.kind != surface_right.kind:
+        raise OverlapError(
+            f'the left picture is {surface_left.kind}, the right one {surface_right.kind}; '
+            'expected one kind of surface'
+        )
+    if abs(surface_left.focal_px / surface_right.focal_px - 1) > _FOCAL_TOLERANCE:
+        raise OverlapError(
+            f'the pictures have focal lengths of {surface_left.focal_px:g} and '
+            f'{surface_right.focal_px:g} px; expected one for both'
+        )
+    for surface in (surface_left, surface_right):
+        if min(surface.width, surface.height) < _SMALLEST_PX:
+            raise OverlapError(
+                f'a picture of {surface.width}x{surface.height} px is too small; expected at '
+                f'least {_SMALLEST_PX} px to each side'
+            )
+    for left, right in pairs:
+        _check_picture('left', left, surface_left)
+        _check_picture('right', right, surface_right)
+
+
+def _check_picture(side, picture, surface) -> None:
+    if picture is None:
+        raise OverlapError(f'the {side} picture is missing')
+    if picture.dtype != np.uint8 or picture.shape[:2] != (surface.height, surface.width):
+        raise OverlapError(
+            f'the {side} picture is {picture.dtype}{picture.shape}; expected uint8 of '
+            f'{surface.width}x{surface.height} px'
+        )
+
+
+class _Measurement:
+    """One pair of pictures, measured."""
+
+    def __init__(self, left, right, surface_left, surface_right, settings):
+        self._left, self._right = _grey(left), _grey(right)
+        self._surfaces = surface_left, surface_right
+        self._settings = settings
+        self._half_start = surface_left.width - surface_left.width // 2
+
+    def run(self, method: str) -> Overlap:
+        if method == 'paper':
+            return self._by_paper()
+        if np.array_equal(self._left, self._right):
+            message = 'both views are the same picture; is one camera used twice, or both covered?'
+            return side_by_side(self._surfaces[0], method, message)
+        search = Search(
+            x_px=self._expected(),
+            max_rise_deg=self._settings.max_rise_deg,
+            min_overlap_deg=self._settings.min_overlap_deg,
+            tilt=self._settings.correct_tilt and self._surfaces[1].yaw_is_column_shift,
+            min_confidence=self._settings.min_confidence,
+        )
+        by_particles = method == 'particles'
+        found = register(
+            self._left, self._right, *self._surfaces, search, by_particles=by_particles
+        )
+        if found.confidence < self._settings.min_confidence:
+            return self._not_found(method, found)
+        return self._found(found)
+
+    def _by_paper(self) -> Overlap:
+        s = self._settings
+        left, right, match = paper.find_match(
+            self._left,
+            self._right,
+            classes=s.paper_classes,
+            opening=s.paper_opening_px,
+            erosions=s.paper_erosions,
+        )
+        if match is None:
+            message = 'no similar particles: the views stay whole, side by side'
+            aside = side_by_side(self._surfaces[0], 'paper', message)
+            return replace(aside, left_particles=left, right_particles=right)
+        width = self._surfaces[0].width
+        x = paper.offset_x(width, left[match.left], right[match.right])
+        return Overlap(
+            method='paper',
+            found=True,
+            offset_x_px=x,
+            offset_y_px=0.0,
+            overlap_px=max(0.0, width - x),
+            confidence=fit_at(self._left, self._right, *self._surfaces, x),
+            min_correlation_value=match.min_correlation_value,
+            left_particles=left,
+            right_particles=right,
+            left_match=match.left,
+            right_match=match.right,
+            message=f'the most similar particles put the right view at {x:.0f} px',
+        )
+
+    def _expected(self) -> tuple[float, float]:
+        """Offsets of the facing halves, px, that the rig's geometry allows."""
+        s = self._settings
+        if isnan(s.expected_yaw_deg) or not self._surfaces[0].yaw_is_column_shift:
+            return Search.x_px
+        left, right = self._surfaces
+        first = left.center_x_px - right.center_x_px - self._half_start
+        return tuple(
+            first + left.focal_px * radians(s.expected_yaw_deg + by)
+            for by in (-s.yaw_tolerance_deg, s.yaw_tolerance_deg)
+        )
+
+    def _found(self, found: Registration) -> Overlap:
+        x, y = found.pose.x_px + self._half_start, found.pose.y_px
+        overlap = Overlap(
+            method='correlation',
+            found=True,
+            offset_x_px=x,
+            offset_y_px=y,
+            turn=found.pose.turn,
+            overlap_px=max(0.0, min(self._surfaces[0].width - x, self._surfaces[1].width)),
+            confidence=found.confidence,
+        )
+        rival_x_px = found.rival_x_px + self._half_start if found.distinct < 1 else nan
+        words = overlap_words.description(overlap, *self._surfaces, rival_x_px)
+        overlap = replace(overlap, message=words)
+        if found.proposals is None:
+            return overlap
+        n, m = found.match
+        left, right = (
+            tuple(Particle(*row) for row in properties.tolist())
+            for properties in (found.proposals.left, found.proposals.right)
+        )
+        matched = paper.mean_differences(left[n : n + 1], right[m : m + 1]) if n >= 0 else [[nan]]
+        return replace(
+            overlap,
+            method='particles',
+            left_particles=left,
+            right_particles=right,
+            left_match=n,
+            right_match=m,
+            min_correlation_value=float(matched[0][0]),
+        )
+
+    def _not_found(self, method, found) -> Overlap:
+        needed = self._settings.min_confidence
+        message = f'no common scene: confidence {found.confidence:.2f}, {needed:.2f} is needed'
+        if found.rival_fit >= needed:
+            offsets = found.pose.x_px + self._half_start, found.rival_x_px + self._half_start
+            message = overlap_words.repetition(*offsets, *self._surfaces)
+        aside = side_by_side(self._surfaces[0], method, message)
+        return replace(aside, confidence=found.confidence)
+
+
+def _grey(picture: np.ndarray) -> np.ndarray:
+    """Give a grey picture (height, width), still 0 exactly where nothing is seen."""
+    if picture.ndim == 2:
+        return picture
+    if picture.shape[2] == 1:
+        return picture[..., 0]
+    grey = cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
+    # A dark pixel that is seen, (1, 0, 0), must not become 0.
+    return np.maximum(grey, picture.max(axis=2) > 0)

@@ -1,0 +1,146 @@
+"""Pairing: frames of several cameras that were taken at the same time.
+
+Cameras run free: at any phase, drifting through all of them, with stamps that jitter. The frames
+that wait form a queue for each camera, and the heads of all queues are the next group. The
+earliest head gives way to its successor only where that makes the group clearly tighter, whether
+the successor waits already or is only due. So no frame is refused for a doubtful gain, and a
+frame that gave way is gone: the other cameras' frames are bound to what comes next.
+"""
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import inf
+from typing import Any, NamedTuple
+
+from panorama_stitch.pipeline.frame_clock import FrameClock
+
+_WAITING = 8
+"""Frames of one camera that may wait for their partners: those of another may come late."""
+_CLEARLY = 0.6
+"""Of a group's spread; a gain that is smaller, or within the jitter, is not worth a frame."""
+_SKEWS = 300
+"""Recent pairs of which the skew is remembered."""
+
+
+class Stamped(NamedTuple):
+    """A frame and when it was taken."""
+
+    stamp_ns: int
+    frame: Any
+
+
+class _Waiting(NamedTuple):
+    """A frame in a queue, and its stamp without the jitter."""
+
+    stamped: Stamped
+    smooth_ns: float
+
+
+@dataclass
+class _Track:
+    """What waits of one camera."""
+
+    waiting: deque[_Waiting] = field(default_factory=deque)
+    clock: FrameClock = field(default_factory=FrameClock)
+    unpaired: int = 0
+
+    def add(self, new: Stamped) -> None:
+        is_later = self.clock.last_ns is None or new.stamp_ns > self.clock.last_ns
+        smooth_ns = self.clock.tick(new.stamp_ns)
+        if not is_later:
+            # The clock jumped back: what waits belongs to another time.
+            self.clear()
+        elif len(self.waiting) == _WAITING:
+            self.drop()
+        self.waiting.append(_Waiting(new, smooth_ns))
+
+    def drop(self) -> None:
+        self.unpaired += 1
+        self.waiting.popleft()
+
+    def clear(self) -> None:
+        self.unpaired += len(self.waiting)
+        self.waiting.clear()
+
+    @property
+    def head(self) -> _Waiting:
+        return self.waiting[0]
+
+    def times_ns(self, near_ns: float) -> list[float]:
+        """When the frames that wait were taken, and the one that is due nearest to a time."""
+        due_ns = self.clock.due_ns(near_ns)
+        waiting = [frame.smooth_ns for frame in self.waiting]
+        return waiting if due_ns is None else [*waiting, due_ns]
+
+
+class FramePairing:
+    """Groups the frames of several cameras by their stamps, within bounded memory.
+
+    Frames come in any order. A group is returned as soon as its last frame comes; frames that are
+    older than a group that was returned are dropped and counted.
+
+    Attributes
+    ----------
+    skews_ns : deque of int
+        Largest difference of stamps within each of the recent groups.
+    """
+
+    def __init__(self, cameras: Sequence[str], max_skew_ns: int):
+        self._tracks = {camera: _Track() for camera in cameras}
+        self.max_skew_ns = max_skew_ns
+        self.skews_ns: deque[int] = deque(maxlen=_SKEWS)
+
+    @property
+    def unpaired(self) -> dict[str, int]:
+        """How many frames of each camera found no partner."""
+        return {camera: track.unpaired for camera, track in self._tracks.items()}
+
+    @property
+    def spread_ns(self) -> int:
+        """How far apart the newest stamps of the cameras lie; 0 before all have one."""
+        newest = [track.clock.last_ns for track in self._tracks.values()]
+        return 0 if None in newest else max(newest) - min(newest)
+
+    def clear(self) -> None:
+        """Forget what waits."""
+        for track in self._tracks.values():
+            track.clear()
+
+    def add(self, camera: str, stamp_ns: int, frame: Any) -> list[Stamped] | None:
+        """Take a frame; return the group that it completes, in the order of the cameras."""
+        self._tracks[camera].add(Stamped(stamp_ns, frame))
+        tracks = list(self._tracks.values())
+        while all(track.waiting for track in tracks):
+            stamps = [track.head.stamped.stamp_ns for track in tracks]
+            skew_ns = max(stamps) - min(stamps)
+            if skew_ns > self.max_skew_ns:
+                tracks[stamps.index(min(stamps))].drop()
+            elif (loose := _loose(tracks)) is not None:
+                loose.drop()
+            else:
+                self.skews_ns.append(skew_ns)
+                return [track.waiting.popleft().stamped for track in tracks]
+        return None
+
+
+def _loose(tracks: Sequence[_Track]) -> _Track | None:
+    """Return the track whose head gives way to its successor, if one does.
+
+    The latest head stays: only what it is grouped with is up for choice.
+    """
+    heads = [track.head.smooth_ns for track in tracks]
+    earliest, latest = min(heads), max(heads)
+    jitter_ns = max(track.clock.jitter_ns for track in tracks)
+    enough_ns = _CLEARLY * (latest - earliest) - jitter_ns
+    if enough_ns <= 0:
+        return None
+    times = [
+        [latest] if head == latest else track.times_ns(latest)
+        for head, track in zip(heads, tracks, strict=True)
+    ]
+    for first in {time for of_track in times for time in of_track if earliest < time <= latest}:
+        group = [min((t for t in of_track if t >= first), default=inf) for of_track in times]
+        if max(group) - first < enough_ns:
+            return tracks[heads.index(earliest)]
+    return None

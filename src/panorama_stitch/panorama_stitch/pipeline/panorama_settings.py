@@ -1,0 +1,122 @@
+"""Settings of the two nodes that make panoramas: the only place with their defaults."""
+
+import re
+from dataclasses import dataclass
+from math import isnan, nan
+
+from fisheye_capture.capture_settings import FrameSettings
+from fisheye_core.errors import SettingError
+from fisheye_core.settings import setting
+from fisheye_undistort.undistort_settings import SurfaceSettings
+from panorama_stitch.compose.compositor import BLENDS
+from panorama_stitch.compose.layout import CROPS
+from panorama_stitch.overlap.overlap_settings import OverlapSettings
+
+_NAME = re.compile(r'[A-Za-z]\w*(/[A-Za-z]\w*)*', re.ASCII)
+"""Of a camera: it is a namespace."""
+
+
+@dataclass(frozen=True)
+class PanoramaOutputSettings(OverlapSettings):
+    """What both nodes that make panoramas can be told."""
+
+    cameras: tuple[str, ...] = setting(
+        ('left', 'right'),
+        'Names of the cameras, from left to right: the namespaces of their topics.',
+    )
+    auto_calibrate: bool = setting(
+        True, 'Measure the overlap on the first good pair of frames.', live=True
+    )
+    offset_x_px: tuple[float, ...] = setting(
+        (nan,),
+        'Offset set by hand, px, one number for each neighbouring pair; NaN: measured.',
+        nan=True,
+        live=True,
+    )
+    offset_y_px: tuple[float, ...] = setting(
+        (nan,),
+        'Vertical offset set by hand, px, one number for each neighbouring pair; NaN: measured.',
+        nan=True,
+        live=True,
+    )
+    overlap_file: str = setting(
+        '', 'YAML file with the overlap: read at start, written on request.'
+    )
+    blend: str = setting(
+        'feather',
+        'How neighbours meet: none lays the right over the left as published, feather fades, '
+        'multiband fades coarse detail over a wider strip than fine detail, flow warps both until '
+        'near things meet.',
+        choices=tuple(BLENDS),
+        live=True,
+    )
+    feather_deg: float = setting(
+        2.0,
+        'Width of the fade at a seam; multiband takes four times as much for coarse detail.',
+        minimum=0.1,
+        maximum=60.0,
+        live=True,
+    )
+    gain_compensation: bool = setting(
+        True, 'Make the cameras equally bright, as measured where they overlap.', live=True
+    )
+    crop: str = setting(
+        'valid',
+        'valid keeps the rows and columns that hold a picture everywhere, none keeps all.',
+        choices=CROPS,
+        live=True,
+    )
+    pair_by: str = setting(
+        'stamp',
+        'What says which frames belong together: their stamps, or when they arrive, for cameras '
+        'whose clocks differ.',
+        choices=('stamp', 'arrival'),
+        live=True,
+    )
+    max_pair_skew_s: float = setting(
+        0.1,
+        'Frames whose stamps differ by more are no pair.',
+        minimum=0.0,
+        maximum=10.0,
+        live=True,
+    )
+    stale_after_s: float = setting(
+        0.5,
+        'A camera that gave no frame for so long is stale.',
+        minimum=0.05,
+        maximum=60.0,
+        live=True,
+    )
+    jpeg_quality: int = setting(
+        80, 'Quality of the compressed panorama.', minimum=1, maximum=100, live=True
+    )
+
+    def __post_init__(self):
+        """Refuse names and numbers that do not belong together."""
+        cameras, pairs = self.cameras, len(self.cameras) - 1
+        if pairs < 1 or len(set(cameras)) != len(cameras):
+            raise SettingError(
+                f'cameras is {list(cameras)}; expected at least two different names'
+            )
+        for name in cameras:
+            if not _NAME.fullmatch(name):
+                raise SettingError(
+                    f"cameras has '{name}'; expected a letter, then letters, digits or _"
+                )
+        for name in ('offset_x_px', 'offset_y_px'):
+            values = getattr(self, name)
+            if len(values) != pairs and not all(map(isnan, values)):
+                raise SettingError(
+                    f'{name} has {len(values)} numbers; expected {pairs}, one for each '
+                    'neighbouring pair'
+                )
+
+
+@dataclass(frozen=True)
+class StitchSettings(PanoramaOutputSettings):
+    """Settings of the stitch node."""
+
+
+@dataclass(frozen=True)
+class PanoramaSettings(PanoramaOutputSettings, SurfaceSettings, FrameSettings):
+    """Settings of the panorama node; those of each camera are `CameraSettings` behind its name."""

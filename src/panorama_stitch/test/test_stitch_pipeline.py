@@ -1,0 +1,364 @@
+"""The live line: pairs become panoramas, a silent camera is shown as such, and all comes back."""
+
+import gc
+import threading
+import time
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from fisheye_capture.scene import Scene
+from fisheye_capture.synthetic import synthetic_lens
+from fisheye_core.errors import CameraFileError, ImageFormatError, OverlapError
+from fisheye_geometry.remap import RemapTable, Turn
+from panorama_stitch.compose.compositor import Compositor
+from panorama_stitch.pipeline.metrics import unpaired
+from panorama_stitch.pipeline.stitch_pipeline import StitchPipeline
+from panorama_stitch.pipeline.panorama_settings import PanoramaSettings
+
+LENS = synthetic_lens(320, 240, np.radians(170))
+YAW = np.radians(140)
+SETTINGS = PanoramaSettings(stale_after_s=0.2)
+DEADLINE_S = 20.0
+STEP_NS = 33_000_000
+TABLES = 3
+"""A compositor needs at most so many for each camera: drawing, seams, gain."""
+
+
+@pytest.fixture(scope='module')
+def pictures():
+    views = [Scene().view(LENS, Turn(yaw_rad=yaw)) for yaw in (-YAW / 2, YAW / 2)]
+    return dict(zip(('left', 'right'), (view.frame(0) for view in views), strict=True))
+
+
+class Line:
+    """A live stitcher, what it published, and a hand that feeds it."""
+
+    def __init__(self, settings=SETTINGS):
+        self.published, self.warnings, self.changed = [], [], []
+        self.news = threading.Event()
+        self.live = StitchPipeline(
+            settings, publish=self._publish, changed=self.changed.append, warn=self.warnings.append
+        )
+        for camera in settings.cameras:
+            self.live.place(camera, LENS, settings.surface_of(LENS))
+        self.stamp_ns = 0
+
+    def _publish(self, compositor, images, stamp_ns, ages_s):
+        surface = compositor.layout.surface
+        out = np.empty((surface.height, surface.width, *images[0].shape[2:]), np.uint8)
+        compositor.compose(images, out)
+        self.published.append((stamp_ns, out, ages_s))
+
+    def feed(self, pictures, until, what):
+        """Feed frames of these cameras until a condition holds."""
+        deadline = time.monotonic() + DEADLINE_S
+        while not until():
+            assert time.monotonic() < deadline, what
+            self.stamp_ns += STEP_NS
+            for camera, picture in pictures.items():
+                self.live.take(camera, self.stamp_ns, picture)
+            self.news.wait(0.01)
+
+
+@pytest.fixture
+def make_line():
+    lines = []
+
+    def make(settings=SETTINGS):
+        lines.append(Line(settings))
+        return lines[-1]
+
+    yield make
+    for line in lines:
+        line.live.stop()
+
+
+def effective_overlaps(line):
+    return line.live.stitcher.overlaps[0]
+
+
+def test_pairs_become_panoramas_with_a_measured_offset(make_line, pictures):
+    line = make_line()
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    assert effective_overlaps(line).offset_x_px == pytest.approx(YAW * LENS.focal_x_px, abs=1.0)
+    assert line.published[0][2] == {}
+    assert line.warnings == []
+
+
+def test_a_silent_camera_is_shown_as_such_and_comes_back(make_line, pictures):
+    line = make_line()
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    bright = line.published[-1][1]
+    left = {'left': pictures['left']}
+    line.feed(left, lambda: line.published[-1][2], 'a panorama of the living side')
+    stamp_ns, dimmed, ages_s = line.published[-1]
+    assert list(ages_s) == ['right']
+    assert stamp_ns == line.stamp_ns, 'the stamp of the living side'
+    half = bright.shape[1] // 3
+    assert (dimmed[:, :half] == bright[:, :half]).all()
+    assert dimmed[:, -half:].mean() < 0.5 * bright[:, -half:].mean()
+    line.feed(pictures, lambda: not line.published[-1][2], 'both sides again')
+    assert (line.published[-1][1] == bright).all()
+
+
+def test_a_camera_that_never_came_is_black_and_then_measured(make_line, pictures):
+    line = make_line()
+    right = {'right': pictures['right']}
+    line.feed(right, lambda: line.published, 'a panorama of one camera')
+    _, picture, ages_s = line.published[-1]
+    assert list(ages_s) == ['left']
+    assert picture[:, : picture.shape[1] // 3].max() == 0
+    line.feed(
+        pictures, lambda: line.live.stitcher.overlaps and not line.published[-1][2], 'both sides'
+    )
+    assert effective_overlaps(line).found
+
+
+def test_with_both_silent_nothing_is_published(make_line, pictures):
+    line = make_line()
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    deadline = time.monotonic() + DEADLINE_S
+    while len(line.live.ages_s()) < 2:
+        assert time.monotonic() < deadline
+        line.news.wait(0.02)
+    count = len(line.published)
+    line.news.wait(0.3)
+    assert len(line.published) == count
+
+
+def test_panoramas_go_on_while_the_overlap_is_measured(make_line, pictures):
+    line = make_line()
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    answer = line.live.calibrate('correlation', save=False)
+    line.feed(pictures, answer.done, 'an answer')
+    assert answer.result()[0].found
+
+
+def test_an_answer_without_overlap_never_replaces_a_good_one(make_line, pictures):
+    line = make_line()
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    good = effective_overlaps(line)
+    dark = {camera: np.zeros_like(picture) for camera, picture in pictures.items()}
+    end = time.monotonic() + 1.5
+    line.feed(dark, lambda: time.monotonic() > end, 'time to forget the bright pictures')
+    assert not line.live.calibrate('', save=False).result(DEADLINE_S)[0].found
+    assert effective_overlaps(line) == good
+
+
+def test_night_at_start_is_tried_again(make_line, pictures):
+    line = make_line()
+    dark = {camera: np.zeros_like(picture) for camera, picture in pictures.items()}
+    line.feed(dark, lambda: line.published, 'a dark panorama, side by side')
+    assert not effective_overlaps(line).found
+    line.feed(pictures, lambda: effective_overlaps(line).found, 'an overlap after all')
+
+
+def test_an_overlap_is_kept_in_its_file(make_line, pictures, tmp_path):
+    path = tmp_path / 'overlap.yaml'
+    settings = replace(SETTINGS, overlap_file=str(path))
+    first = make_line(settings)
+    first.feed(pictures, lambda: first.published, 'a panorama')
+    first.live.calibrate('', save=True).result(DEADLINE_S)
+    second = make_line(replace(settings, auto_calibrate=False))
+    dark = {camera: np.zeros_like(picture) for camera, picture in pictures.items()}
+    second.feed(dark, lambda: second.published, 'a panorama')
+    assert effective_overlaps(second).offset_x_px == pytest.approx(effective_overlaps(first).offset_x_px)
+    path.write_text('version: 77')
+    third = make_line(settings)
+    third.feed(pictures, lambda: third.published, 'a panorama')
+    assert effective_overlaps(third).found
+    assert 'the overlap is measured instead' in third.warnings[0]
+
+
+def test_what_cannot_be_done_is_said(make_line, pictures, tmp_path):
+    line = make_line()
+    with pytest.raises(OverlapError, match='no pair of frames has come yet'):
+        line.live.calibrate('', save=False).result(DEADLINE_S)
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    with pytest.raises(OverlapError, match='overlap_file is empty'):
+        line.live.calibrate('', save=True).result(DEADLINE_S)
+    with pytest.raises(ImageFormatError, match='right has 10x10 px; expected 320x240'):
+        line.live.take('right', 1, np.zeros((10, 10, 3), np.uint8))
+    (tmp_path / 'file').write_text('')
+    line.live.apply(replace(SETTINGS, overlap_file=str(tmp_path / 'file' / 'overlap.yaml')))
+    before = effective_overlaps(line)
+    with pytest.raises(CameraFileError, match='cannot be written'):
+        line.live.calibrate('', save=True).result(DEADLINE_S)
+    assert effective_overlaps(line) is before, 'what was in use stays in use'
+
+
+def test_what_was_not_found_is_not_saved(make_line, pictures, tmp_path):
+    path = tmp_path / 'overlap.yaml'
+    line = make_line(replace(SETTINGS, overlap_file=str(path)))
+    dark = {camera: np.zeros_like(picture) for camera, picture in pictures.items()}
+    line.feed(dark, lambda: line.published, 'a dark panorama')
+    line.live.calibrate('', save=True).result(DEADLINE_S)
+    assert not path.exists()
+
+
+def test_a_file_that_cannot_even_be_looked_at_is_said(make_line, pictures):
+    line = make_line(replace(SETTINGS, overlap_file='x' * 5000))
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    assert 'cannot be read' in line.warnings[0]
+
+
+def test_it_is_said_from_which_pictures_on_what_is_in_use(make_line, pictures):
+    line = make_line()
+    line.feed(pictures, lambda: line.changed, 'an overlap')
+    assert 0 < effective_overlaps(line).stamp_ns <= line.changed[0] <= line.stamp_ns
+
+
+def test_a_setting_applies_to_the_next_frames(make_line, pictures):
+    line = make_line()
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    width = line.published[-1][1].shape[1]
+    line.live.apply(replace(SETTINGS, offset_x_px=(200.0,)))
+    line.feed(pictures, lambda: line.published[-1][1].shape[1] < width, 'a narrower panorama')
+    line.live.apply(SETTINGS)
+    line.feed(pictures, lambda: line.published[-1][1].shape[1] == width, 'the measured one back')
+
+
+def test_another_lens_is_measured_anew(make_line, pictures):
+    line = make_line()
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    former = effective_overlaps(line)
+    small = synthetic_lens(160, 120, np.radians(170))
+    shrunk = {name: cv2.resize(picture, (160, 120)) for name, picture in pictures.items()}
+    for camera in shrunk:
+        line.live.place(camera, small, SETTINGS.surface_of(small))
+    count = len(line.published)
+    line.feed(shrunk, lambda: len(line.published) > count + 3, 'panoramas of the other lens')
+    assert effective_overlaps(line).offset_x_px == pytest.approx(former.offset_x_px / 2, abs=1.0)
+
+
+def test_pictures_that_waited_while_the_lens_changed_stop_nothing(make_line, pictures):
+    line = make_line()
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    composing, start_pending_job = threading.Event(), threading.Event()
+    publish = line.live._publish
+
+    def publish_late(*arguments):
+        composing.set()
+        start_pending_job.wait(DEADLINE_S)
+        publish(*arguments)
+
+    line.live._publish = publish_late
+    line.feed(pictures, composing.is_set, 'a panorama in work')
+    for _ in range(3):
+        line.stamp_ns += STEP_NS
+        for camera, picture in pictures.items():
+            line.live.take(camera, line.stamp_ns, picture)
+    small = synthetic_lens(160, 120, np.radians(170))
+    shrunk = {name: cv2.resize(picture, (160, 120)) for name, picture in pictures.items()}
+    for camera in shrunk:
+        line.live.place(camera, small, SETTINGS.surface_of(small))
+    start_pending_job.set()
+    count = len(line.published)
+    line.feed(shrunk, lambda: len(line.published) > count + 3, 'panoramas of the other lens')
+    assert line.live.trouble == ''
+
+
+def test_colour_beside_grey_wins_whoever_comes_first(make_line, pictures):
+    line = make_line(replace(SETTINGS, gain_compensation=False))
+    grey = {name: cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) for name, image in pictures.items()}
+    line.feed({**pictures, 'left': grey['left']}, lambda: line.published, 'a panorama')
+    first = line.published[-1][1]
+    third = first.shape[1] // 3
+    assert np.ptp(first[:, :third], axis=2).max() == 0, 'the left is grey'
+    assert np.ptp(first[:, -third:], axis=2).max() > 50, 'the right is in colour'
+    line.feed(grey, lambda: line.published[-1][1].ndim == 2, 'a grey panorama')
+    line.feed(pictures, lambda: line.published[-1][1].ndim == 3, 'one in colour again')
+    assert line.warnings == []
+
+
+def stamps_apart(line, pictures, seconds, until, what):
+    """Feed frames whose stamps differ by a constant; return the stamp of the left one."""
+    deadline = time.monotonic() + DEADLINE_S
+    while not until():
+        assert time.monotonic() < deadline, what
+        line.stamp_ns += STEP_NS
+        line.live.take('left', line.stamp_ns, pictures['left'])
+        line.live.take('right', line.stamp_ns + round(seconds * 1e9), pictures['right'])
+        line.news.wait(0.01)
+
+
+def test_cameras_of_different_clocks_are_paired_by_arrival(make_line, pictures):
+    line = make_line()
+    apart = (line, pictures, -37.0)
+    end = time.monotonic() + 0.5
+    stamps_apart(*apart, lambda: time.monotonic() > end, 'time for a pair')
+    assert not line.published
+    assert unpaired(line.live, SETTINGS).endswith('pair_by:=arrival joins what arrives together')
+    assert 'the stamps of the cameras are 37 s apart' in unpaired(line.live, SETTINGS)
+    line.live.apply(replace(SETTINGS, pair_by='arrival'))
+    stamps_apart(*apart, lambda: len(line.published) > 5, 'panoramas')
+    assert line.published[-1][0] <= line.stamp_ns - 37 * 10**9, 'the older stamp'
+    line.live.apply(SETTINGS)
+    line.feed(pictures, lambda: line.published[-1][0] > 0, 'pairs by stamp again')
+
+
+def test_a_lens_that_changes_with_each_frame_stops_no_panorama(make_line, pictures):
+    line = make_line()
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    count = len(line.published)
+    for index in range(1, 21):
+        lens = replace(LENS, focal_x_px=LENS.focal_x_px + 0.01 * index)
+        line.live.place('left', lens, SETTINGS.surface_of(lens))
+        line.feed(pictures, lambda seen=count + index: len(line.published) >= seen, 'the next one')
+    assert line.live.unpaired_s < SETTINGS.stale_after_s
+
+
+def test_the_published_rule_asked_for_once_ruins_no_rig(make_line, pictures):
+    line = make_line(replace(SETTINGS, min_confidence=0.5))
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    good = effective_overlaps(line)
+    (asked,) = line.live.calibrate('paper', save=False).result(DEADLINE_S)
+    assert (asked.method, asked.found) == ('paper', False)
+    assert asked.confidence < 0.5
+    assert 'the most similar particles put the right view at' in asked.message
+    assert '0.50 is needed (with the parameter method:=paper' in asked.message
+    assert effective_overlaps(line) == good
+    line.live.apply(replace(SETTINGS, method='paper', min_confidence=0.5))
+    (asked,) = line.live.calibrate('', save=False).result(DEADLINE_S)
+    assert asked.found
+    assert effective_overlaps(line) == asked
+
+
+def test_a_setting_that_changes_while_an_overlap_is_sought_need_not_wait(make_line, pictures):
+    line = make_line(replace(SETTINGS, stale_after_s=60.0))
+    dark = {camera: np.zeros_like(picture) for camera, picture in pictures.items()}
+    measure, is_measuring, start_pending_job = line.live.stitcher.measure, threading.Event(), threading.Event()
+
+    def measure_late(*arguments):
+        is_measuring.set()
+        start_pending_job.wait(DEADLINE_S)
+        return measure(*arguments)
+
+    line.live.stitcher.measure = measure_late
+    line.feed(dark, is_measuring.is_set, 'a search')
+    line.live.apply(replace(SETTINGS, stale_after_s=60.0, crop='none', feather_deg=3.0))
+    is_measuring.clear()
+    start_pending_job.set()
+    begin = time.monotonic()
+    line.feed(dark, is_measuring.is_set, 'the next search')
+    assert time.monotonic() - begin < 2.0, 'the pause between two searches'
+
+
+def test_what_was_made_for_former_settings_is_let_go(make_line, pictures):
+    line = make_line()
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    for hfov_deg in range(140, 152):
+        settings, count = replace(SETTINGS, hfov_deg=float(hfov_deg)), len(line.changed)
+        line.live.apply(settings)
+        for camera in settings.cameras:
+            line.live.place(camera, LENS, settings.surface_of(LENS))
+        line.feed(pictures, lambda seen=count: len(line.changed) > seen, 'another compositor')
+    gc.collect()
+    alive = [type(thing) for thing in gc.get_objects()]
+    lines = 1 + alive.count(Line)
+    assert alive.count(Compositor) <= 2 * lines, 'the one in use, and the one being made'
+    tables = 4 + 2 * lines * len(SETTINGS.cameras) * TABLES
+    assert alive.count(RemapTable) <= tables
