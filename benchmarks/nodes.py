@@ -10,13 +10,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
-from fisheye_testing.health import usage
 from pairs import SIDES, synthetic_pair
-from fisheye_testing.rig import Rig, camera_parameters, unused_domain, wait_for
 from targets import Target
-from fisheye_testing.watcher import Watcher
 
 from fisheye_geometry.camera_file import Camera, write_camera
+from fisheye_testing.health import usage
+from fisheye_testing.rig import Rig, camera_parameters, unused_domain, wait_for
+from fisheye_testing.watcher import Watcher
 
 FULL_SPEED_HZ = 1000.0
 ONE_CORE = ('taskset', '--cpu-list', '0')

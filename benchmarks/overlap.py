@@ -20,7 +20,12 @@ import numpy as np
 from overlap_cases import Case, cases
 from overlap_picture import draw
 
-from panorama_stitch.overlap.measure_overlap import METHODS, Overlap, OverlapSettings, measure_overlap
+from panorama_stitch.overlap.measure_overlap import (
+    METHODS,
+    Overlap,
+    OverlapSettings,
+    measure_overlap,
+)
 from panorama_stitch.overlap.particles import facing_halves
 
 FIRST_SEED = 5000

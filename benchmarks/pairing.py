@@ -7,7 +7,8 @@ each; frames are those of the slowest camera. Prints the table of docs/stitch.md
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from fisheye_testing.free_running import Camera, Paired, pair
+from fisheye_testing.free_running import Camera, Paired, pair_frames
+from panorama_stitch.pipeline.pairing import FramePairing
 
 PHASES = (0.0, 0.1, 0.25, 0.4, 0.45, 0.5, 0.55, 0.6, 0.75, 0.9)
 """Of the period of the second camera, behind the first."""
@@ -44,7 +45,7 @@ def measure(cameras: Sequence[Camera]) -> list[Paired]:
             replace(camera, phase_ms=phase * 1000 / camera.rate_hz / max(index, 1) * (index > 0))
             for index, camera in enumerate(cameras)
         ]
-        results += [pair(shifted, seed=seed) for seed in SEEDS]
+        results += [pair_frames(FramePairing, shifted, seed=seed) for seed in SEEDS]
     return results
 
 

@@ -4,6 +4,7 @@ import time
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from field import START_S, Field
+
 from fisheye_testing.mjpeg_server import jpeg
 from fisheye_testing.rig import wait_for
 

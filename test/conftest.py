@@ -6,6 +6,7 @@ from pathlib import Path
 import hypothesis
 import pytest
 from field import Field
+
 from fisheye_testing.rig import Rig, unused_domain
 from fisheye_testing.watcher import Watcher
 

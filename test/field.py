@@ -6,14 +6,14 @@ from math import radians
 from pathlib import Path
 
 import cv2
-from fisheye_testing.health import Health
-from fisheye_testing.mjpeg_server import MjpegServer
-from fisheye_testing.rig import SIDES, Rig, wait_for
 
 from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.camera_file import Camera, write_camera
 from fisheye_geometry.remap import Turn
+from fisheye_testing.health import Health
+from fisheye_testing.mjpeg_server import MjpegServer
+from fisheye_testing.rig import SIDES, Rig, wait_for
 
 START_S = 60.0
 """For what happens some time, even where much else runs too."""

@@ -27,7 +27,7 @@ def test_every_node_has_a_page_with_its_parameters():
     for settings in (
         'fisheye_capture.capture_settings.CaptureSettings',
         'fisheye_undistort.undistort_settings.UndistortSettings',
-        'panorama_stitch.pipeline.panorama_settings.StitchSettings',
+        'panorama_stitch.pipeline.panorama_settings.PanoramaOutputSettings',
         'panorama_stitch.pipeline.panorama_settings.PanoramaSettings',
         'panorama_viewer.settings.ViewerSettings',
     ):

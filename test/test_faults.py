@@ -6,6 +6,7 @@ import camera_faults
 import pytest
 from camera_faults import ERROR, OK, check_camera_fault
 from field import START_S
+
 from fisheye_testing.rig import SEPARATE, wait_for
 
 SAME_PX = 1e-6

@@ -15,8 +15,8 @@ from fisheye_bridge.images import from_jpeg, to_array
 from fisheye_bridge.projection import surface_of
 from fisheye_bridge.stamps import ns_of, stamp_of
 from fisheye_capture.synthetic import synthetic_lens
-from fisheye_geometry.camera_file import Camera, read_camera, write_camera
 from fisheye_core.errors import CameraFileError, FisheyeError
+from fisheye_geometry.camera_file import Camera, read_camera, write_camera
 from fisheye_undistort.undistort_settings import UndistortSettings
 from panorama_stitch.overlap.overlap_file import read_overlaps, write_overlaps
 from panorama_stitch.overlap.measure_overlap import Overlap

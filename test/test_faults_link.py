@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from field import RETURN_S, START_S
 from namespaces import Link
+
 from fisheye_testing.rig import SIDES, Rig, wait_for
 
 LONG = bool(os.environ.get('LONG'))

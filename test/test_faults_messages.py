@@ -7,12 +7,9 @@ import numpy as np
 import pytest
 from field import START_S
 from fisheye_msgs.msg import Projection
-from fisheye_testing.health import usage
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
-from fisheye_testing.image_message import to_message
 from messages import camera_infos, compressed_images, images, projections
-from fisheye_testing.rig import wait_for
 from sensor_msgs.msg import CompressedImage, Image
 
 from fisheye_bridge.camera_info import camera_of
@@ -20,6 +17,9 @@ from fisheye_bridge.images import from_jpeg
 from fisheye_bridge.qos import IMAGE, LATCHED
 from fisheye_bridge.stamps import stamp_of
 from fisheye_core.errors import FisheyeError
+from fisheye_testing.health import usage
+from fisheye_testing.image_message import to_message
+from fisheye_testing.rig import wait_for
 from fisheye_undistort.undistort_settings import UndistortSettings
 
 EXAMPLES, FEW = (1000, 1000) if os.environ.get('LONG') else (200, 50)

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 from field import START_S
-from fisheye_testing.health import usage
 from namespaces import Namespace
+
+from fisheye_testing.health import usage
 from fisheye_testing.rig import SEPARATE, SIDES, Rig, wait_for
 from fisheye_testing.watcher import Watcher
 

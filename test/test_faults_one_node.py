@@ -6,6 +6,7 @@ import camera_faults
 import pytest
 from camera_faults import check_camera_fault
 from field import START_S, write_pictures
+
 from fisheye_testing.health import usage
 from fisheye_testing.rig import SIDES, wait_for
 

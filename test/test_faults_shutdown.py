@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 from field import START_S, write_pictures
 from fisheye_msgs.srv import CalibrateOverlap
-from fisheye_testing.health import Health
-from fisheye_testing.mjpeg_server import MjpegServer, jpeg
-from fisheye_testing.rig import SIDES, Rig, unused_domain, wait_for
 from sensor_msgs.msg import Image
 
 from fisheye_bridge.qos import IMAGE_INPUT
+from fisheye_testing.health import Health
+from fisheye_testing.mjpeg_server import MjpegServer, jpeg
+from fisheye_testing.rig import SIDES, Rig, unused_domain, wait_for
 
 STOP_S = 2.0
 NOBODY = 'http://127.0.0.1:9/stream'

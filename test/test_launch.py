@@ -9,6 +9,7 @@ import launching
 import pytest
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix
 from field import START_S
+
 from fisheye_testing.health import Health
 from fisheye_testing.rig import Rig, wait_for
 

@@ -76,7 +76,9 @@ def imports(path):
 
 
 def is_shell(package, path):
-    return package == 'fisheye_bridge' or path.stem.endswith('_node')
+    return (
+        package == 'fisheye_bridge' or path.stem.endswith('_node') or path.parent.stem == 'nodes'
+    )
 
 
 @pytest.mark.parametrize(('package', 'path'), MODULES)

@@ -22,6 +22,8 @@ from fisheye_bridge.projection import projection_of
 from fisheye_bridge.qos import IMAGE_INPUT, LATCHED
 from fisheye_bridge.stamps import stamp_of
 from fisheye_geometry.surface import Surface
+from fisheye_testing.free_running import Camera
+from fisheye_testing.rig import SIDES, wait_for
 
 WATCHED_S = 8.0
 START_S = 40.0

@@ -5,8 +5,6 @@ import threading
 import numpy as np
 import pytest
 import rclpy
-from fisheye_testing.image_message import to_message
-from fisheye_testing.rig import wait_for
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
@@ -18,6 +16,8 @@ from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.camera_file import Camera
 from fisheye_geometry.remap import Turn
+from fisheye_testing.image_message import to_message
+from fisheye_testing.rig import wait_for
 
 START_S = 40.0
 RECORDED_NS = 1_600_000_000_000_000_000

@@ -8,6 +8,7 @@ from pathlib import Path
 import cv2
 import pytest
 from ament_index_python.packages import get_package_prefix
+
 from fisheye_testing.rig import camera_parameters, wait_for
 
 COMMAND = Path(get_package_prefix('panorama_viewer')) / 'lib' / 'panorama_viewer' / 'snapshot'

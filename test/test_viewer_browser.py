@@ -13,12 +13,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from fisheye_testing.rig import camera_parameters, wait_for
 from selenium import webdriver
 from selenium.webdriver import ActionChains, Keys
 
 from fisheye_bridge.projection import surface_of
 from fisheye_geometry.surface import Surface
+from fisheye_testing.rig import camera_parameters, wait_for
 from panorama_viewer.projection import described
 from panorama_viewer.server import ViewerServer
 from panorama_viewer.settings import ViewerSettings

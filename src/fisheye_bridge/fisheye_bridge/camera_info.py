@@ -3,8 +3,8 @@
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
-from fisheye_geometry.camera import Camera, Readout, camera_from
 from fisheye_core.errors import CalibrationError
+from fisheye_geometry.camera import Camera, Readout, camera_from
 from fisheye_geometry.lens import Lens, make_lens
 
 

@@ -12,8 +12,8 @@ from fisheye_bridge.camera_info import lens_of, readout_of
 from fisheye_bridge.diagnostics import ERROR, WARN, WARNING_PAUSE_S, Report
 from fisheye_bridge.qos import BEST_EFFORT_INPUT
 from fisheye_bridge.topics import ImageSubscription
-from fisheye_geometry.camera import Readout
 from fisheye_core.errors import CalibrationError, FisheyeError
+from fisheye_geometry.camera import Readout
 from fisheye_geometry.image_circle import CircledLens
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.settling import Settling

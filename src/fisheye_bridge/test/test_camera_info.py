@@ -7,8 +7,8 @@ from std_msgs.msg import Header
 
 from fisheye_bridge.camera_info import camera_info_of, camera_of, lens_of
 from fisheye_bridge.projection import projection_of, surface_of
-from fisheye_geometry.camera_file import Camera
 from fisheye_core.errors import CalibrationError, GeometryError
+from fisheye_geometry.camera_file import Camera
 from fisheye_geometry.lens import make_lens
 from fisheye_geometry.surface import Surface
 

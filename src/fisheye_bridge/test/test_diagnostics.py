@@ -7,7 +7,7 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 
-from fisheye_bridge.diagnostics import OK, WARN, Diagnostics, Report, OverloadMonitor
+from fisheye_bridge.diagnostics import OK, WARN, Diagnostics, OverloadMonitor, Report
 
 DEADLINE_S = 10.0
 

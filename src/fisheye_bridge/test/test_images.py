@@ -5,7 +5,6 @@ from array import array
 import cv2
 import numpy as np
 import pytest
-from fisheye_testing.image_message import to_message
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
@@ -17,6 +16,7 @@ from fisheye_bridge.images import (
 )
 from fisheye_core.encodings import CHANNELS, converted
 from fisheye_core.errors import ImageFormatError
+from fisheye_testing.image_message import to_message
 
 COLORS = np.zeros((8, 12, 3), np.uint8)
 COLORS[:, :6] = (200, 90, 40)

@@ -7,8 +7,8 @@ from urllib.parse import unquote
 
 from ament_index_python.packages import get_package_share_directory
 
-from fisheye_geometry.camera_file import Camera, read_camera
 from fisheye_core.errors import CameraFileError
+from fisheye_geometry.camera_file import Camera, read_camera
 
 _VARIABLE = re.compile(r'\$\{([^}]*)\}?')
 

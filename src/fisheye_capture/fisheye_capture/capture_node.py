@@ -13,13 +13,13 @@ from fisheye_bridge.running import run
 from fisheye_bridge.stamps import stamp_of
 from fisheye_bridge.topics import ImagePublisher
 from fisheye_capture.calibration_url import calibration_path
-from fisheye_capture.grabber import Grabber
-from fisheye_core.latest_only import LatestOnlyWorker
 from fisheye_capture.capture_settings import CaptureSettings
+from fisheye_capture.grabber import Grabber
 from fisheye_capture.source import Frame, JpegFrame, shown_source
-from fisheye_geometry.camera_file import Camera, read_camera, write_camera
 from fisheye_core.errors import CameraFileError, FisheyeError
+from fisheye_core.latest_only import LatestOnlyWorker
 from fisheye_core.yaml_file import is_missing
+from fisheye_geometry.camera_file import Camera, read_camera, write_camera
 
 
 class CaptureNode(Node):
@@ -81,7 +81,9 @@ class CaptureNode(Node):
     def _describe(self, camera: Camera | None, width: int, height: int) -> None:
         """Prepare the camera_info of pictures of this size; without K if it is not known."""
         self._described = camera, width, height
-        self._fault = camera.size_mismatch(width, height) if camera else 'the camera is not calibrated'
+        self._fault = (
+            camera.size_mismatch(width, height) if camera else 'the camera is not calibrated'
+        )
         if self._fault:
             self._info = CameraInfo(width=width, height=height)
             self.get_logger().warning(f'{self._fault}: camera_info is published without K')
@@ -94,8 +96,8 @@ class CaptureNode(Node):
             if self._calibration_path is None:
                 raise CameraFileError('camera_info_url is empty; expected the file to write')
             camera = camera_of(request.camera_info, self._settings.camera_name)
-            if self._described and (misfit := camera.size_mismatch(*self._described[1:])):
-                raise CameraFileError(size_mismatch)
+            if self._described and (mismatch := camera.size_mismatch(*self._described[1:])):
+                raise CameraFileError(mismatch)
             write_camera(self._calibration_path, camera)
         except FisheyeError as error:
             response.success, response.status_message = False, str(error)

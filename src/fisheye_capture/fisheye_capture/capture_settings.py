@@ -3,8 +3,8 @@
 from dataclasses import dataclass, replace
 from math import isnan, nan
 
-from fisheye_geometry.lens import MAX_PICTURE_SIDE_PX
 from fisheye_core.settings import setting
+from fisheye_geometry.lens import MAX_PICTURE_SIDE_PX
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from fisheye_capture.pace import PacedSource
 from fisheye_capture.capture_settings import CaptureSettings
+from fisheye_capture.pace import PacedSource
 from fisheye_capture.source import SourceEndedError
 from fisheye_core.encodings import from_opencv
 from fisheye_core.errors import SourceError

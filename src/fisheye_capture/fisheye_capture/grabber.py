@@ -3,11 +3,11 @@
 from collections.abc import Callable
 from threading import Event, Thread
 
-from fisheye_core.rate_meter import RateMeter
 from fisheye_capture.capture_settings import CaptureSettings
 from fisheye_capture.source import Frame, Source, SourceEndedError, SourceLostError
 from fisheye_capture.sources import open_source
 from fisheye_core.errors import FisheyeError
+from fisheye_core.rate_meter import RateMeter
 
 _FIRST_WAIT_S = 0.25
 """Before the first attempt to reopen; doubled before each further one."""

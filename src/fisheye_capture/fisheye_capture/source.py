@@ -7,10 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
-from fisheye_geometry.camera_file import Camera
 from fisheye_core.coded_picture import decoded
 from fisheye_core.encodings import from_opencv
 from fisheye_core.errors import SourceError
+from fisheye_geometry.camera_file import Camera
 
 
 class SourceLostError(SourceError):

@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from fisheye_capture.capture_settings import CaptureSettings
 from fisheye_capture.pace import PacedSource
 from fisheye_capture.scene import Scene
-from fisheye_capture.capture_settings import CaptureSettings
-from fisheye_geometry.camera_file import Camera
 from fisheye_core.encodings import from_opencv
+from fisheye_geometry.camera_file import Camera
 from fisheye_geometry.lens import FisheyeLens
 from fisheye_geometry.remap import Turn
 

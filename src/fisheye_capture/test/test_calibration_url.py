@@ -7,8 +7,8 @@ import pytest
 from fisheye_capture import calibration_url
 from fisheye_capture.calibration_url import calibration_of, calibration_path
 from fisheye_capture.synthetic import synthetic_lens
-from fisheye_geometry.camera_file import Camera, write_camera
 from fisheye_core.errors import CameraFileError
+from fisheye_geometry.camera_file import Camera, write_camera
 
 
 @pytest.mark.parametrize(

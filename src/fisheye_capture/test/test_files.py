@@ -8,6 +8,7 @@ from fisheye_testing.odd_pictures import huge_png, turned_video
 from fisheye_capture.source import SourceEndedError
 from fisheye_capture.sources import open_source
 from fisheye_core.errors import SourceError
+from fisheye_testing.odd_pictures import huge_png
 
 CODING_LOSS = 6
 """Grey levels by which a video's coding may miss a plain picture."""

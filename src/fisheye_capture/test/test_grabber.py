@@ -3,12 +3,12 @@
 from threading import Event
 
 import pytest
-from fisheye_testing.mjpeg_server import MjpegServer, jpeg
 
 from fisheye_capture import grabber as grabber_module
 from fisheye_capture.grabber import Grabber
 from fisheye_capture.source import Frame, Source, SourceEndedError, SourceLostError
 from fisheye_core.errors import ImageFormatError, SourceError
+from fisheye_testing.mjpeg_server import MjpegServer, jpeg
 
 
 @pytest.fixture

@@ -4,12 +4,12 @@ import time
 from threading import Thread
 
 import pytest
-from fisheye_testing.mjpeg_server import MjpegServer, jpeg
 
 from fisheye_capture import stream
 from fisheye_capture.source import SourceLostError
 from fisheye_capture.stream import StreamSource
 from fisheye_core.errors import SourceError
+from fisheye_testing.mjpeg_server import MjpegServer, jpeg
 
 CODING_LOSS = 4
 """Grey levels by which JPEG may miss a plain picture."""

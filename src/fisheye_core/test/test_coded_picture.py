@@ -3,10 +3,10 @@
 import cv2
 import numpy as np
 import pytest
-from fisheye_testing.odd_pictures import turned
 
 from fisheye_core.coded_picture import decoded, size_of, whole_jpeg
 from fisheye_core.errors import ImageFormatError
+from fisheye_testing.odd_pictures import turned
 
 PICTURE = np.random.default_rng(1).integers(0, 256, (37, 53, 3), np.uint8)
 

@@ -3,10 +3,10 @@
 import cv2
 import numpy as np
 import pytest
-from fisheye_testing.odd_pictures import huge_png, turned
 
 from fisheye_core.errors import SourceError
 from fisheye_core.picture_file import SUFFIXES, is_picture, pictures_in, read_picture
+from fisheye_testing.odd_pictures import huge_png, turned
 
 PICTURE = np.full((48, 64, 3), (10, 20, 30), np.uint8)
 

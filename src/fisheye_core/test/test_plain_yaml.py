@@ -6,9 +6,9 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from fisheye_geometry.camera_file import read_camera
 from fisheye_core.errors import CameraFileError, FisheyeError
 from fisheye_core.plain_yaml import parse_mapping
+from fisheye_geometry.camera_file import read_camera
 
 FILE = """# A lens.
 image_width: 640

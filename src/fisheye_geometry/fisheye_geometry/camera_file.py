@@ -6,12 +6,12 @@ of camera_info as `ros2 topic echo` prints it, and OpenCV's FileStorage with the
 
 from pathlib import Path
 
-from fisheye_geometry.calibration_ini import is_ini, parse_ini
-from fisheye_geometry.camera import IDENTITY, Camera, Readout, camera_from
 from fisheye_core.errors import CalibrationError, CameraFileError
-from fisheye_geometry.lens import make_lens
 from fisheye_core.plain_yaml import Mapping, parse_mapping
 from fisheye_core.yaml_file import is_number, read_text, shown, write_mapping
+from fisheye_geometry.calibration_ini import is_ini, parse_ini
+from fisheye_geometry.camera import IDENTITY, Camera, Readout, camera_from
+from fisheye_geometry.lens import make_lens
 
 __all__ = ['Camera', 'read_camera', 'write_camera']
 

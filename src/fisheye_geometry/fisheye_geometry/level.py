@@ -7,8 +7,8 @@ from math import atan2, isnan, nan, pi
 
 import numpy as np
 
-from fisheye_geometry.attitude import LEVEL, Attitude, rotation_matrix
 from fisheye_core.errors import GeometryError
+from fisheye_geometry.attitude import LEVEL, Attitude, rotation_matrix
 from fisheye_geometry.rig import unwrapped
 
 LEVELS = ('symmetric', 'imu', 'first', 'none')

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from fisheye_geometry.attitude import LEVEL, Attitude
 from fisheye_core.errors import GeometryError, ImageFormatError
+from fisheye_geometry.attitude import LEVEL, Attitude
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.surface import Surface
 

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fisheye_geometry.attitude import Attitude, rotation_matrix, rotation_vector
 from fisheye_core.errors import GeometryError
+from fisheye_geometry.attitude import Attitude, rotation_matrix, rotation_vector
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.surface import Surface
 

@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from fisheye_geometry.camera import IDENTITY, Camera, Readout, camera_from
 from fisheye_core.errors import CalibrationError
+from fisheye_geometry.camera import IDENTITY, Camera, Readout, camera_from
 from fisheye_geometry.lens import make_lens
 
 LENS = make_lens(

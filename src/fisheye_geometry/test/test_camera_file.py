@@ -3,8 +3,8 @@
 import pytest
 import yaml
 
-from fisheye_geometry.camera_file import Camera, read_camera, write_camera
 from fisheye_core.errors import CameraFileError
+from fisheye_geometry.camera_file import Camera, read_camera, write_camera
 from fisheye_geometry.lens import make_lens
 
 CAMERA = Camera(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fisheye_geometry.image_circle import ImageCircle, CircledLens
+from fisheye_geometry.image_circle import CircledLens, ImageCircle
 from fisheye_geometry.lens import make_lens
 
 LENS = make_lens('equidistant', 640, 480, [150, 0, 310, 0, 150, 245, 0, 0, 1], [-0.02, 0, 0, 0])

@@ -5,8 +5,8 @@ from math import nan
 import numpy as np
 import pytest
 
-from fisheye_geometry.attitude import Attitude, angle_between
 from fisheye_core.errors import GeometryError
+from fisheye_geometry.attitude import Attitude, angle_between
 from fisheye_geometry.level import Mount, levelled
 
 EXACT_DEG = 1e-6

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fisheye_geometry.attitude import Attitude, angle_between, rotation_matrix
 from fisheye_core.errors import GeometryError
+from fisheye_geometry.attitude import Attitude, angle_between, rotation_matrix
 from fisheye_geometry.lens import make_lens
 from fisheye_geometry.rig import Rig, RigCamera, chain, pairs_of, unwrapped
 

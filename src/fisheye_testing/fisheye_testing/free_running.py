@@ -1,11 +1,10 @@
 """Stamps of cameras that run free, and what becomes of them when they are paired."""
 
 import random
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-
-from panorama_stitch.pipeline.pairing import FramePairing
+from typing import Any
 
 EPOCH_NS = 1_700_000_000 * 10**9
 MAX_SKEW_NS = 100_000_000
@@ -69,10 +68,25 @@ class Paired:
     worst_skew_ms: float
 
 
-def pair(
-    cameras: Sequence[Camera], *, seconds: float = 20.0, seed: int = 0, warm_up: int = 10
+def pair_frames(
+    make_pairing: Callable[[Sequence[str], int], Any],
+    cameras: Sequence[Camera],
+    *,
+    seconds: float = 20.0,
+    seed: int = 0,
+    warm_up: int = 10,
 ) -> Paired:
-    """Pair the frames of cameras as they come, and leave the first groups out of the figures."""
+    """Pair the frames of cameras as they come, and leave the first groups out of the figures.
+
+    Parameters
+    ----------
+    make_pairing
+        Builds what pairs, a `FramePairing`, from names and the largest skew, ns.
+    cameras
+        How the frames come.
+    seconds, seed, warm_up
+        For how long, by which chance, and how many groups are left out.
+    """
     chance = random.Random(seed)
     stamps = [camera.stamps_ms(seconds, chance) for camera in cameras]
     arrivals = sorted(
@@ -81,7 +95,7 @@ def pair(
         for stamp_ms in stamps[index]
     )
     names = [str(index) for index in range(len(cameras))]
-    pairing = FramePairing(names, MAX_SKEW_NS)
+    pairing = make_pairing(names, MAX_SKEW_NS)
     groups, times_ms = [], []
     for arrival_ms, index, stamp_ns in arrivals:
         if group := pairing.add(names[index], stamp_ns, None):

@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+
+from fisheye_testing.image_message import to_array
 from fisheye_testing.rig import wait_for
 from fisheye_testing.watcher import Watcher
-
-from fisheye_bridge.images import to_array
 
 _BRIGHT_SHARE = 0.7
 """A side darker than this share of its usual level is dimmed."""
@@ -86,17 +86,17 @@ class Health(Watcher):
         return float(gaps[gaps > _LONG_GAP_S].sum()), float(left), float(right)
 
     def level(self, node: str) -> bytes:
-        """Give the last level of a node in /diagnostics; STALE where there is none."""
+        """Return the last level of a node in /diagnostics; STALE where there is none."""
         return self.status[node].level if node in self.status else DiagnosticStatus.STALE
 
     def value(self, node: str, key: str) -> str | None:
-        """Give a value of a node's last diagnostics, None where there is none."""
+        """Return a value of a node's last diagnostics, None where there is none."""
         entries = self.status[node].values if node in self.status else ()
         return next((entry.value for entry in entries if entry.key == key), None)
 
     def _take(self, message) -> None:
         super()._take(message)
-        image = to_array(message)[0][::_STEP_PX, ::_STEP_PX]
+        image = to_array(message)[::_STEP_PX, ::_STEP_PX]
         quarter = image.shape[1] // 4
         levels = float(image[:, :quarter].mean()), float(image[:, -quarter:].mean())
         self.seen.append(Seen(time.monotonic(), self.stamps_ns[-1], levels))
@@ -115,7 +115,7 @@ class Usage(NamedTuple):
 
 
 def usage(pid: int) -> Usage:
-    """Give what a process uses now."""
+    """Return what a process uses now."""
     folder = Path(f'/proc/{pid}')
     resident, shared = (int(pages) / 256 for pages in (folder / 'statm').read_text().split()[1:3])
     files, threads = (len(list((folder / part).iterdir())) for part in ('fd', 'task'))

@@ -8,11 +8,15 @@ import rclpy
 from fisheye_msgs.msg import Overlaps, Projection
 from fisheye_msgs.srv import CalibrateOverlap
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Image
 
-from fisheye_bridge.images import to_array
-from fisheye_bridge.qos import IMAGE_INPUT, LATCHED
-from fisheye_bridge.stamps import ns_of
+from fisheye_testing.image_message import stamp_ns, to_array
+
+IMAGE_INPUT = QoSProfile(depth=3, reliability=ReliabilityPolicy.RELIABLE)
+LATCHED = QoSProfile(
+    depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+)
 
 
 class Watcher:
@@ -63,11 +67,11 @@ class Watcher:
         self.stamps_ns, self.latencies_ms = [], []
 
     def picture(self) -> np.ndarray:
-        """Give a copy of the newest panorama."""
-        return to_array(self.newest)[0].copy()
+        """Return a copy of the newest panorama."""
+        return to_array(self.newest).copy()
 
     def picture_on(self, topic: str, timeout_s: float = 10.0) -> np.ndarray:
-        """Give the next picture of an image topic."""
+        """Return the next picture of an image topic."""
         taken, came = [], threading.Event()
 
         def take(message):
@@ -78,7 +82,7 @@ class Watcher:
         if not came.wait(timeout_s):
             raise TimeoutError(f'no picture came on {topic} within {timeout_s:g} s')
         self.node.destroy_subscription(subscription)
-        return to_array(taken[0])[0]
+        return to_array(taken[0])
 
     def calibrate(self, timeout_s: float = 20.0, **request) -> CalibrateOverlap.Response:
         """Call the rig's calibrate_overlap service."""
@@ -96,9 +100,8 @@ class Watcher:
             self._executor.spin_once(timeout_sec=0.1)
 
     def _take(self, message) -> None:
-        stamp_ns = ns_of(message.header.stamp)
-        self.stamps_ns.append(stamp_ns)
-        self.latencies_ms.append((time.time_ns() - stamp_ns) / 1e6)
+        self.stamps_ns.append(stamp_ns(message.header))
+        self.latencies_ms.append((time.time_ns() - self.stamps_ns[-1]) / 1e6)
         self.newest = message
 
     def _take_projection(self, message) -> None:

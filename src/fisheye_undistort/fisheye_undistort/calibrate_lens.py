@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from fisheye_geometry.camera_file import Camera, write_camera
 from fisheye_core.errors import FisheyeError, SettingError
+from fisheye_geometry.camera_file import Camera, write_camera
 from fisheye_undistort.calibration import calibrate
 from fisheye_undistort.collector import Collector
 from fisheye_undistort.detection import Detector

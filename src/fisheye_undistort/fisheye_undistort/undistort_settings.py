@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from math import radians
 
+from fisheye_core.settings import setting
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.remap import INTERPOLATIONS
-from fisheye_core.settings import setting
 from fisheye_geometry.surface import SCALES, SURFACES, Surface, surface_for
 
 

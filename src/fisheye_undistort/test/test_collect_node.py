@@ -2,12 +2,12 @@ import threading
 
 import pytest
 import rclpy
-from fisheye_testing.image_message import to_message
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from fisheye_bridge.qos import IMAGE
 from fisheye_core.errors import SettingError, SourceError
+from fisheye_testing.image_message import to_message
 from fisheye_undistort import collect_node
 from fisheye_undistort.collect_node import collect
 from fisheye_undistort.collector import Collector

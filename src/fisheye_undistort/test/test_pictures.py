@@ -1,9 +1,9 @@
 import cv2
 import numpy as np
 import pytest
-from fisheye_testing.odd_pictures import huge_png, turned
 
 from fisheye_core.errors import SourceError
+from fisheye_testing.odd_pictures import huge_png, turned
 from fisheye_undistort.pictures import read_pictures
 
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import rclpy
 from fisheye_msgs.msg import Projection
-from fisheye_testing.image_message import to_message
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -21,8 +20,9 @@ from fisheye_bridge.projection import surface_of
 from fisheye_bridge.qos import IMAGE, LATCHED
 from fisheye_geometry.camera_file import Camera
 from fisheye_geometry.lens import make_lens
-from fisheye_undistort.undistort_settings import UndistortSettings
+from fisheye_testing.image_message import to_message
 from fisheye_undistort.undistort_node import UndistortNode
+from fisheye_undistort.undistort_settings import UndistortSettings
 
 DEADLINE_S = 10.0
 LENS = make_lens('equidistant', 160, 120, [54, 0, 79.5, 0, 54, 59.5, 0, 0, 1], [0, 0, 0, 0])

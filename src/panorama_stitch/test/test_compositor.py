@@ -9,8 +9,8 @@ import pytest
 from scenes import placed_at
 
 from fisheye_capture.scene import Scene
-from fisheye_geometry.attitude import LEVEL
 from fisheye_core.errors import ImageFormatError
+from fisheye_geometry.attitude import LEVEL
 from fisheye_geometry.lens import make_lens
 from fisheye_geometry.remap import Turn
 from fisheye_geometry.surface import surface_for

@@ -2,12 +2,12 @@
 
 import pytest
 
-from panorama_stitch.pipeline.metrics import latencies
+from panorama_stitch.pipeline.metrics import latency_metrics
 
 
 def test_percentiles_of_the_latency():
-    assert latencies([]) == {}
-    told = latencies(range(101))
+    assert latency_metrics([]) == {}
+    told = latency_metrics(range(101))
     assert told == {'latency p50 ms': 50.0, 'latency p95 ms': 95.0, 'latency p99 ms': 99.0}
 
 
@@ -16,5 +16,5 @@ def test_percentiles_of_the_latency():
     [(-37_000.0, '37 s ahead of'), (1.8e12, '1.8e+09 s behind'), (-3.0, '0.003 s ahead of')],
 )
 def test_clocks_that_differ_are_told_in_place_of_a_latency(latency_ms, words):
-    told = latencies([latency_ms] * 9)
+    told = latency_metrics([latency_ms] * 9)
     assert told == {'latency': f"not known: the stamps are {words} this machine's clock"}

@@ -24,7 +24,8 @@ from fisheye_core.errors import OverlapError
 from fisheye_geometry.remap import LEVEL, Turn
 from fisheye_geometry.surface import SURFACES, Surface, surface_for
 from panorama_stitch.overlap import registration
-from panorama_stitch.overlap.measure_overlap import METHODS, OverlapSettings, measure_overlap
+from panorama_stitch.overlap.measure_overlap import measure_overlap
+from panorama_stitch.overlap.overlap_settings import METHODS, OverlapSettings
 from panorama_stitch.overlap.proposals import Proposals
 
 SETTINGS = OverlapSettings()

@@ -1,10 +1,10 @@
 """Pairing: right partners, whatever the order, and never more memory than agreed."""
 
 import pytest
-from fisheye_testing.free_running import Camera, pair
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fisheye_testing.free_running import Camera, pair_frames
 from panorama_stitch.pipeline.pairing import FramePairing
 
 MS = 1_000_000
@@ -122,7 +122,7 @@ def test_cameras_of_one_rate_lose_no_frame_at_any_phase(rate_hz, phase, jitter, 
         Camera(rate_hz, 0.0, jitter * period_ms),
         Camera(rate_hz, phase * period_ms, jitter * period_ms),
     ]
-    paired = pair(cameras, seconds=10.0, seed=seed)
+    paired = pair_frames(FramePairing, cameras, seconds=10.0, seed=seed)
     assert paired.share > ENOUGH
     assert paired.gap_periods < GAP
     assert paired.worst_skew_ms < (SHIFT + 3 * jitter) * period_ms + 1.0
@@ -135,7 +135,7 @@ def test_the_slower_camera_sets_the_rate(rate_hz, slower, phase, jitter, seed):
         Camera(rate_hz, 0.0, jitter * period_ms),
         Camera(rate_hz * slower, phase * period_ms, jitter * period_ms),
     ]
-    paired = pair(cameras, seconds=10.0, seed=seed)
+    paired = pair_frames(FramePairing, cameras, seconds=10.0, seed=seed)
     assert paired.share > ENOUGH
     assert paired.gap_periods < GAP
     assert paired.worst_skew_ms < (SHIFT + 3 * jitter) * period_ms + 1.0
@@ -147,7 +147,7 @@ def test_three_free_cameras_lose_no_frame(rates_hz, second, third, seed):
         Camera(rate, phase * 1000 / rate, 1.0)
         for rate, phase in zip(rates_hz, (0.0, second, third), strict=True)
     ]
-    paired = pair(cameras, seconds=10.0, seed=seed)
+    paired = pair_frames(FramePairing, cameras, seconds=10.0, seed=seed)
     assert paired.share > ENOUGH
     assert paired.gap_periods < GAP
 
@@ -157,12 +157,13 @@ def test_frames_that_come_late_lose_nothing(rates_hz, phase, seed):
     first, second = rates_hz
     late_ms = 6 * 1000 / max(rates_hz)
     cameras = [Camera(first, 0.0, 1.0), Camera(second, phase * 33.0, 1.0, late_ms=late_ms)]
-    assert pair(cameras, seconds=10.0, seed=seed).share > ENOUGH
+    assert pair_frames(FramePairing, cameras, seconds=10.0, seed=seed).share > ENOUGH
 
 
 @given(phases, st.floats(0.0, 0.1), st.integers(0, 99))
 def test_a_lost_frame_costs_one_group(phase, lost, seed):
-    paired = pair([Camera(30, 0.0, 1.0), Camera(30, phase * 33.0, 1.0, lost)], seed=seed)
+    cameras = [Camera(30, 0.0, 1.0), Camera(30, phase * 33.0, 1.0, lost)]
+    paired = pair_frames(FramePairing, cameras, seed=seed)
     # Where the frame was lost just as the order of the cameras changed, it is two.
     assert paired.share > ENOUGH - lost
     assert paired.worst_skew_ms < 34.0 + 2.0

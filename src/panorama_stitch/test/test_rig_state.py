@@ -61,7 +61,9 @@ def test_without_a_measurement_the_frames_stand_side_by_side(pictures):
 def test_an_offset_set_by_hand_wins_and_nan_gives_the_measured_one_back(pictures):
     stitcher = stitcher_of()
     stitcher.overlaps = stitcher.measure([pictures], SETTINGS, 'particles')
-    by_hand = stitcher.effective_overlaps(replace(SETTINGS, offset_x_px=(500.0,), offset_y_px=(nan,)))[0]
+    by_hand = stitcher.effective_overlaps(
+        replace(SETTINGS, offset_x_px=(500.0,), offset_y_px=(nan,))
+    )[0]
     assert (by_hand.offset_x_px, by_hand.method) == (500.0, 'manual')
     assert by_hand.offset_y_px == stitcher.overlaps[0].offset_y_px
     assert stitcher.effective_overlaps(SETTINGS) == stitcher.overlaps

@@ -1,4 +1,4 @@
-"""The live line: pairs become panoramas, a silent camera is shown as such, and all comes back."""
+"""The pipeline: pairs become panoramas, a silent camera is shown as such and comes back."""
 
 import gc
 import threading
@@ -14,9 +14,9 @@ from fisheye_capture.synthetic import synthetic_lens
 from fisheye_core.errors import CameraFileError, ImageFormatError, OverlapError
 from fisheye_geometry.remap import RemapTable, Turn
 from panorama_stitch.compose.compositor import Compositor
-from panorama_stitch.pipeline.metrics import unpaired
-from panorama_stitch.pipeline.stitch_pipeline import StitchPipeline
+from panorama_stitch.pipeline.metrics import unpaired_sentence
 from panorama_stitch.pipeline.panorama_settings import PanoramaSettings
+from panorama_stitch.pipeline.stitch_pipeline import StitchPipeline
 
 LENS = synthetic_lens(320, 240, np.radians(170))
 YAW = np.radians(140)
@@ -34,23 +34,30 @@ def pictures():
 
 
 class Line:
-    """A live stitcher, what it published, and a hand that feeds it."""
+    """A pipeline, what it made, and a hand that feeds it."""
 
     def __init__(self, settings=SETTINGS):
-        self.published, self.warnings, self.changed = [], [], []
-        self.news = threading.Event()
-        self.live = StitchPipeline(
-            settings, publish=self._publish, changed=self.changed.append, warn=self.warnings.append
-        )
+        self.published, self.warnings = [], []
+        self.news, self.may_draw = threading.Event(), threading.Event()
+        self.may_draw.set()
+        self.pipeline = StitchPipeline(settings)
         for camera in settings.cameras:
-            self.live.place(camera, LENS, settings.surface_of(LENS))
+            self.pipeline.place(camera, LENS, settings.surface_of(LENS))
         self.stamp_ns = 0
+        self._thread = threading.Thread(target=self._draw, daemon=True)
+        self._thread.start()
 
-    def _publish(self, compositor, images, stamp_ns, ages_s):
-        surface = compositor.layout.surface
-        out = np.empty((surface.height, surface.width, *images[0].shape[2:]), np.uint8)
-        compositor.compose(images, out)
-        self.published.append((stamp_ns, out, ages_s))
+    def stop(self):
+        self.pipeline.stop()
+        self._thread.join()
+
+    def _draw(self):
+        while (panorama := self.pipeline.next()) is not None:
+            assert self.may_draw.wait(DEADLINE_S)
+            surface, image = panorama.surface, panorama.images[0]
+            out = np.empty((surface.height, surface.width, *image.shape[2:]), np.uint8)
+            panorama.draw(out)
+            self.published.append((panorama.stamp_ns, out, panorama.stale))
 
     def feed(self, pictures, until, what):
         """Feed frames of these cameras until a condition holds."""
@@ -59,8 +66,13 @@ class Line:
             assert time.monotonic() < deadline, what
             self.stamp_ns += STEP_NS
             for camera, picture in pictures.items():
-                self.live.take(camera, self.stamp_ns, picture)
+                self.take(camera, picture)
+            self.warnings += self.pipeline.take_notices()
             self.news.wait(0.01)
+
+    def take(self, camera, picture, later_ns=0):
+        encoding = 'mono8' if picture.ndim == 2 else 'bgr8'
+        self.pipeline.take(camera, self.stamp_ns + later_ns, picture, encoding)
 
 
 @pytest.fixture
@@ -73,17 +85,17 @@ def make_line():
 
     yield make
     for line in lines:
-        line.live.stop()
+        line.stop()
 
 
-def effective_overlaps(line):
-    return line.live.stitcher.overlaps[0]
+def overlap_in_use(line):
+    return line.pipeline.rig.overlaps[0]
 
 
 def test_pairs_become_panoramas_with_a_measured_offset(make_line, pictures):
     line = make_line()
     line.feed(pictures, lambda: line.published, 'a panorama')
-    assert effective_overlaps(line).offset_x_px == pytest.approx(YAW * LENS.focal_x_px, abs=1.0)
+    assert overlap_in_use(line).offset_x_px == pytest.approx(YAW * LENS.focal_x_px, abs=1.0)
     assert line.published[0][2] == {}
     assert line.warnings == []
 
@@ -110,18 +122,19 @@ def test_a_camera_that_never_came_is_black_and_then_measured(make_line, pictures
     line.feed(right, lambda: line.published, 'a panorama of one camera')
     _, picture, ages_s = line.published[-1]
     assert list(ages_s) == ['left']
-    assert picture[:, : picture.shape[1] // 3].max() == 0
+    above_text = picture.shape[0] // 4
+    assert picture[:above_text, : picture.shape[1] // 3].max() == 0
     line.feed(
-        pictures, lambda: line.live.stitcher.overlaps and not line.published[-1][2], 'both sides'
+        pictures, lambda: line.pipeline.rig.overlaps and not line.published[-1][2], 'both sides'
     )
-    assert effective_overlaps(line).found
+    assert overlap_in_use(line).found
 
 
 def test_with_both_silent_nothing_is_published(make_line, pictures):
     line = make_line()
     line.feed(pictures, lambda: line.published, 'a panorama')
     deadline = time.monotonic() + DEADLINE_S
-    while len(line.live.ages_s()) < 2:
+    while len(line.pipeline.ages_s()) < 2:
         assert time.monotonic() < deadline
         line.news.wait(0.02)
     count = len(line.published)
@@ -132,7 +145,7 @@ def test_with_both_silent_nothing_is_published(make_line, pictures):
 def test_panoramas_go_on_while_the_overlap_is_measured(make_line, pictures):
     line = make_line()
     line.feed(pictures, lambda: line.published, 'a panorama')
-    answer = line.live.calibrate('correlation', save=False)
+    answer = line.pipeline.calibrate('correlation', save=False)
     line.feed(pictures, answer.done, 'an answer')
     assert answer.result()[0].found
 
@@ -140,20 +153,20 @@ def test_panoramas_go_on_while_the_overlap_is_measured(make_line, pictures):
 def test_an_answer_without_overlap_never_replaces_a_good_one(make_line, pictures):
     line = make_line()
     line.feed(pictures, lambda: line.published, 'a panorama')
-    good = effective_overlaps(line)
+    good = overlap_in_use(line)
     dark = {camera: np.zeros_like(picture) for camera, picture in pictures.items()}
     end = time.monotonic() + 1.5
     line.feed(dark, lambda: time.monotonic() > end, 'time to forget the bright pictures')
-    assert not line.live.calibrate('', save=False).result(DEADLINE_S)[0].found
-    assert effective_overlaps(line) == good
+    assert not line.pipeline.calibrate('', save=False).result(DEADLINE_S)[0].found
+    assert overlap_in_use(line) == good
 
 
 def test_night_at_start_is_tried_again(make_line, pictures):
     line = make_line()
     dark = {camera: np.zeros_like(picture) for camera, picture in pictures.items()}
     line.feed(dark, lambda: line.published, 'a dark panorama, side by side')
-    assert not effective_overlaps(line).found
-    line.feed(pictures, lambda: effective_overlaps(line).found, 'an overlap after all')
+    assert not overlap_in_use(line).found
+    line.feed(pictures, lambda: overlap_in_use(line).found, 'an overlap after all')
 
 
 def test_an_overlap_is_kept_in_its_file(make_line, pictures, tmp_path):
@@ -161,33 +174,33 @@ def test_an_overlap_is_kept_in_its_file(make_line, pictures, tmp_path):
     settings = replace(SETTINGS, overlap_file=str(path))
     first = make_line(settings)
     first.feed(pictures, lambda: first.published, 'a panorama')
-    first.live.calibrate('', save=True).result(DEADLINE_S)
+    first.pipeline.calibrate('', save=True).result(DEADLINE_S)
     second = make_line(replace(settings, auto_calibrate=False))
     dark = {camera: np.zeros_like(picture) for camera, picture in pictures.items()}
     second.feed(dark, lambda: second.published, 'a panorama')
-    assert effective_overlaps(second).offset_x_px == pytest.approx(effective_overlaps(first).offset_x_px)
+    assert overlap_in_use(second).offset_x_px == pytest.approx(overlap_in_use(first).offset_x_px)
     path.write_text('version: 77')
     third = make_line(settings)
     third.feed(pictures, lambda: third.published, 'a panorama')
-    assert effective_overlaps(third).found
+    assert overlap_in_use(third).found
     assert 'the overlap is measured instead' in third.warnings[0]
 
 
 def test_what_cannot_be_done_is_said(make_line, pictures, tmp_path):
     line = make_line()
     with pytest.raises(OverlapError, match='no pair of frames has come yet'):
-        line.live.calibrate('', save=False).result(DEADLINE_S)
+        line.pipeline.calibrate('', save=False).result(DEADLINE_S)
     line.feed(pictures, lambda: line.published, 'a panorama')
     with pytest.raises(OverlapError, match='overlap_file is empty'):
-        line.live.calibrate('', save=True).result(DEADLINE_S)
+        line.pipeline.calibrate('', save=True).result(DEADLINE_S)
     with pytest.raises(ImageFormatError, match='right has 10x10 px; expected 320x240'):
-        line.live.take('right', 1, np.zeros((10, 10, 3), np.uint8))
+        line.take('right', np.zeros((10, 10, 3), np.uint8))
     (tmp_path / 'file').write_text('')
-    line.live.apply(replace(SETTINGS, overlap_file=str(tmp_path / 'file' / 'overlap.yaml')))
-    before = effective_overlaps(line)
+    line.pipeline.apply(replace(SETTINGS, overlap_file=str(tmp_path / 'file' / 'overlap.yaml')))
+    before = overlap_in_use(line)
     with pytest.raises(CameraFileError, match='cannot be written'):
-        line.live.calibrate('', save=True).result(DEADLINE_S)
-    assert effective_overlaps(line) is before, 'what was in use stays in use'
+        line.pipeline.calibrate('', save=True).result(DEADLINE_S)
+    assert overlap_in_use(line) is before, 'what was in use stays in use'
 
 
 def test_what_was_not_found_is_not_saved(make_line, pictures, tmp_path):
@@ -195,7 +208,7 @@ def test_what_was_not_found_is_not_saved(make_line, pictures, tmp_path):
     line = make_line(replace(SETTINGS, overlap_file=str(path)))
     dark = {camera: np.zeros_like(picture) for camera, picture in pictures.items()}
     line.feed(dark, lambda: line.published, 'a dark panorama')
-    line.live.calibrate('', save=True).result(DEADLINE_S)
+    line.pipeline.calibrate('', save=True).result(DEADLINE_S)
     assert not path.exists()
 
 
@@ -205,60 +218,51 @@ def test_a_file_that_cannot_even_be_looked_at_is_said(make_line, pictures):
     assert 'cannot be read' in line.warnings[0]
 
 
-def test_it_is_said_from_which_pictures_on_what_is_in_use(make_line, pictures):
+def test_an_overlap_has_the_stamp_of_the_images_it_was_measured_on(make_line, pictures):
     line = make_line()
-    line.feed(pictures, lambda: line.changed, 'an overlap')
-    assert 0 < effective_overlaps(line).stamp_ns <= line.changed[0] <= line.stamp_ns
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    assert 0 < overlap_in_use(line).stamp_ns <= line.published[0][0] <= line.stamp_ns
 
 
 def test_a_setting_applies_to_the_next_frames(make_line, pictures):
     line = make_line()
     line.feed(pictures, lambda: line.published, 'a panorama')
     width = line.published[-1][1].shape[1]
-    line.live.apply(replace(SETTINGS, offset_x_px=(200.0,)))
+    line.pipeline.apply(replace(SETTINGS, offset_x_px=(200.0,)))
     line.feed(pictures, lambda: line.published[-1][1].shape[1] < width, 'a narrower panorama')
-    line.live.apply(SETTINGS)
+    line.pipeline.apply(SETTINGS)
     line.feed(pictures, lambda: line.published[-1][1].shape[1] == width, 'the measured one back')
 
 
 def test_another_lens_is_measured_anew(make_line, pictures):
     line = make_line()
     line.feed(pictures, lambda: line.published, 'a panorama')
-    former = effective_overlaps(line)
+    former = overlap_in_use(line)
     small = synthetic_lens(160, 120, np.radians(170))
     shrunk = {name: cv2.resize(picture, (160, 120)) for name, picture in pictures.items()}
     for camera in shrunk:
-        line.live.place(camera, small, SETTINGS.surface_of(small))
+        line.pipeline.place(camera, small, SETTINGS.surface_of(small))
     count = len(line.published)
     line.feed(shrunk, lambda: len(line.published) > count + 3, 'panoramas of the other lens')
-    assert effective_overlaps(line).offset_x_px == pytest.approx(former.offset_x_px / 2, abs=1.0)
+    assert overlap_in_use(line).offset_x_px == pytest.approx(former.offset_x_px / 2, abs=1.0)
 
 
 def test_pictures_that_waited_while_the_lens_changed_stop_nothing(make_line, pictures):
     line = make_line()
     line.feed(pictures, lambda: line.published, 'a panorama')
-    composing, start_pending_job = threading.Event(), threading.Event()
-    publish = line.live._publish
-
-    def publish_late(*arguments):
-        composing.set()
-        start_pending_job.wait(DEADLINE_S)
-        publish(*arguments)
-
-    line.live._publish = publish_late
-    line.feed(pictures, composing.is_set, 'a panorama in work')
+    line.may_draw.clear()
     for _ in range(3):
         line.stamp_ns += STEP_NS
         for camera, picture in pictures.items():
-            line.live.take(camera, line.stamp_ns, picture)
+            line.take(camera, picture)
     small = synthetic_lens(160, 120, np.radians(170))
     shrunk = {name: cv2.resize(picture, (160, 120)) for name, picture in pictures.items()}
     for camera in shrunk:
-        line.live.place(camera, small, SETTINGS.surface_of(small))
-    start_pending_job.set()
+        line.pipeline.place(camera, small, SETTINGS.surface_of(small))
+    line.may_draw.set()
     count = len(line.published)
     line.feed(shrunk, lambda: len(line.published) > count + 3, 'panoramas of the other lens')
-    assert line.live.trouble == ''
+    assert line.pipeline.trouble == ''
 
 
 def test_colour_beside_grey_wins_whoever_comes_first(make_line, pictures):
@@ -280,8 +284,8 @@ def stamps_apart(line, pictures, seconds, until, what):
     while not until():
         assert time.monotonic() < deadline, what
         line.stamp_ns += STEP_NS
-        line.live.take('left', line.stamp_ns, pictures['left'])
-        line.live.take('right', line.stamp_ns + round(seconds * 1e9), pictures['right'])
+        line.take('left', pictures['left'])
+        line.take('right', pictures['right'], round(seconds * 1e9))
         line.news.wait(0.01)
 
 
@@ -291,12 +295,13 @@ def test_cameras_of_different_clocks_are_paired_by_arrival(make_line, pictures):
     end = time.monotonic() + 0.5
     stamps_apart(*apart, lambda: time.monotonic() > end, 'time for a pair')
     assert not line.published
-    assert unpaired(line.live, SETTINGS).endswith('pair_by:=arrival joins what arrives together')
-    assert 'the stamps of the cameras are 37 s apart' in unpaired(line.live, SETTINGS)
-    line.live.apply(replace(SETTINGS, pair_by='arrival'))
+    sentence = unpaired_sentence(line.pipeline)
+    assert sentence.endswith('pair_by:=arrival joins what arrives together')
+    assert 'the stamps of the cameras are 37 s apart' in sentence
+    line.pipeline.apply(replace(SETTINGS, pair_by='arrival'))
     stamps_apart(*apart, lambda: len(line.published) > 5, 'panoramas')
     assert line.published[-1][0] <= line.stamp_ns - 37 * 10**9, 'the older stamp'
-    line.live.apply(SETTINGS)
+    line.pipeline.apply(SETTINGS)
     line.feed(pictures, lambda: line.published[-1][0] > 0, 'pairs by stamp again')
 
 

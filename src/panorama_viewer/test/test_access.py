@@ -14,8 +14,7 @@ import pytest
 from serving import DEADLINE_S, address, here, picture, request, state, visit
 
 from fisheye_core.errors import SettingError
-from panorama_viewer import browser
-from panorama_viewer import connection
+from panorama_viewer import browser, connection
 from panorama_viewer.token import kept_token
 
 REFUSED, LATER = 1008, 1013

@@ -8,12 +8,12 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from fisheye_core.parallel import run_parallel
 from panorama_stitch.compose.blend import Feather, Multiband
 from panorama_stitch.compose.fade import Fade
 from panorama_stitch.compose.flow import Flow
 from panorama_stitch.compose.gain import GainCompensation
 from panorama_stitch.compose.layout import Layout, neighbours, wrapped
-from fisheye_core.parallel import run_parallel
 from panorama_stitch.compose.placing import Placed, PlacedView
 from panorama_stitch.compose.view import Cut
 
@@ -74,6 +74,11 @@ class Compositor:
                 for parts, rows in zip(self._parts, slabs, strict=True)
             ]
         )
+
+    def fits(self, images: Sequence[np.ndarray]) -> bool:
+        """Whether images (height, width[, channels]) have the sizes that the views are for."""
+        sizes = [(view.source.height, view.source.width) for view in self.views]
+        return sizes == [image.shape[:2] for image in images]
 
     def compose(
         self,

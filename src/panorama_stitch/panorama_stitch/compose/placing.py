@@ -8,10 +8,10 @@ from math import inf, pi
 import numpy as np
 
 from fisheye_core.errors import GeometryError
+from fisheye_core.parallel import run_parallel
 from fisheye_geometry.rig import unwrapped
 from fisheye_geometry.surface import Surface
 from fisheye_geometry.surface_kind import KINDS
-from fisheye_core.parallel import run_parallel
 from panorama_stitch.compose.view import Cut, View, shown
 
 _WIDEST_STEP_RAD = np.radians(210)

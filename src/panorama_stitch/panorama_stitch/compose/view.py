@@ -6,8 +6,8 @@ from math import pi
 
 import numpy as np
 
-from fisheye_geometry.attitude import LEVEL, Attitude
 from fisheye_core.errors import ImageFormatError
+from fisheye_geometry.attitude import LEVEL, Attitude
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.remap import RemapTable, remap_table
 from fisheye_geometry.surface import Surface

@@ -1,7 +1,10 @@
-"""Stitches corrected pictures of several cameras into one panorama."""
+"""Stitches corrected images of several cameras into one panorama."""
 
+import numpy as np
 from fisheye_msgs.msg import Projection
+from std_msgs.msg import Header
 
+from fisheye_bridge.diagnostics import Report
 from fisheye_bridge.projection import surface_of
 from fisheye_bridge.qos import LATCHED
 from fisheye_bridge.running import run
@@ -11,7 +14,7 @@ from fisheye_core.errors import FisheyeError
 from fisheye_geometry.settling import Settling
 from fisheye_geometry.surface import Surface
 from panorama_stitch.nodes.base_node import PanoramaBase
-from panorama_stitch.pipeline.panorama_settings import StitchSettings
+from panorama_stitch.pipeline.panorama_settings import PanoramaOutputSettings
 
 
 class StitchNode(PanoramaBase):
@@ -20,49 +23,55 @@ class StitchNode(PanoramaBase):
     SETTINGS = (('', StitchSettings),)
 
     def __init__(self, **kwargs):
-        super().__init__('stitch', StitchSettings, **kwargs)
-        self._eyes = [_Eye(self, camera) for camera in self.settings.cameras]
+        super().__init__('stitch', PanoramaOutputSettings, **kwargs)
+        self._inputs = [CorrectedCamera(self, camera) for camera in self.settings.cameras]
 
-    def _report(self, report) -> None:
+    def _report(self, report: Report) -> None:
         super()._report(report)
-        for eye in self._eyes:
-            eye.pictures.dropped.tell(report)
+        for camera in self._inputs:
+            camera.images.dropped.tell(report)
 
 
-class _Eye:
-    """One camera of the node: its corrected pictures, and what they show."""
+class CorrectedCamera:
+    """A camera whose corrected images another node publishes.
+
+    Attributes
+    ----------
+    images : ImageSubscription
+        Its images; those that were not usable are counted there.
+    """
 
     def __init__(self, node: StitchNode, name: str):
-        self.name = name
-        self._node = node
-        self._is_placed, self._announced = False, None
+        self._node, self._name = node, name
+        self._is_placed = False
+        self._announced: Surface | None = None
         self._settling = Settling()
         node.create_subscription(Projection, f'{name}/projection', self._take_projection, LATCHED)
-        self.pictures = ImageSubscription(
+        self.images = ImageSubscription(
             node, f'{name}/image_rect', self._take_image, key=f'{name} refused'
         )
 
-    def _take_projection(self, message) -> None:
-        """Take the first projection at once, another one when a picture of its size comes."""
+    def _take_projection(self, message: Projection) -> None:
+        """Take the first projection at once, another one when an image of its size comes."""
         try:
             surface = surface_of(message)
         except FisheyeError as error:
-            self._node.warn(f'{self.name}/projection refused: {error}')
+            self._node.warn(f'{self._name}/projection refused: {error}')
             return
         if self._is_placed:
             self._announced = surface
         else:
             self._place(surface)
 
-    def _take_image(self, image, encoding, header) -> None:
+    def _take_image(self, image: np.ndarray, encoding: str, header: Header) -> None:
         surface = self._announced
         fits = surface and image.shape[:2] == (surface.height, surface.width)
         if fits and self._settling.follow():
             self._place(surface)
-        self._node.take(self.name, ns_of(header.stamp), image, encoding)
+        self._node.pipeline.take(self._name, ns_of(header.stamp), image, encoding)
 
     def _place(self, surface: Surface) -> None:
-        self._node.live.place(self.name, surface, surface)
+        self._node.pipeline.place(self._name, surface, surface)
         self._is_placed, self._announced = True, None
 
 

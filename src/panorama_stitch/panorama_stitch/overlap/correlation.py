@@ -95,7 +95,9 @@ def correlate(facing: FacingPair, x: Sequence[int], y: Sequence[int]) -> ScoreMa
     return ScoreMap(columns, rows, significance_corrected(both / np.maximum(energy, 1.0), energy))
 
 
-def significance_corrected(correlation: np.ndarray | float, energy: np.ndarray | float) -> np.ndarray | float:
+def significance_corrected(
+    correlation: np.ndarray | float, energy: np.ndarray | float
+) -> np.ndarray | float:
     """Lower a correlation by what chance may give to so little structure.
 
     The variance of a structure is about 1 where there is any, so that its energy counts pixels.

@@ -13,8 +13,7 @@ import numpy as np
 
 from fisheye_core.errors import OverlapError
 from fisheye_geometry.surface import Surface
-from panorama_stitch.overlap import wording as overlap_words
-from panorama_stitch.overlap import paper
+from panorama_stitch.overlap import paper, wording
 from panorama_stitch.overlap.overlap_result import Overlap, side_by_side
 from panorama_stitch.overlap.overlap_settings import METHODS, OverlapSettings
 from panorama_stitch.overlap.particles import Particle
@@ -185,7 +184,7 @@ class _Measurement:
             confidence=found.confidence,
         )
         rival_x_px = found.rival_x_px + self._half_start if found.distinct < 1 else nan
-        words = overlap_words.description(overlap, *self._surfaces, rival_x_px)
+        words = wording.description(overlap, *self._surfaces, rival_x_px)
         overlap = replace(overlap, message=words)
         if found.proposals is None:
             return overlap
@@ -210,7 +209,7 @@ class _Measurement:
         message = f'no common scene: confidence {found.confidence:.2f}, {needed:.2f} is needed'
         if found.rival_fit >= needed:
             offsets = found.pose.x_px + self._half_start, found.rival_x_px + self._half_start
-            message = overlap_words.repetition(*offsets, *self._surfaces)
+            message = wording.repetition(*offsets, *self._surfaces)
         aside = side_by_side(self._surfaces[0], method, message)
         return replace(aside, confidence=found.confidence)
 

@@ -6,9 +6,9 @@ from math import degrees, inf, radians
 from pathlib import Path
 
 from fisheye_core.errors import CameraFileError
+from fisheye_core.yaml_file import is_missing, is_number, read_mapping, shown, write_mapping
 from fisheye_geometry.remap import Turn
 from fisheye_geometry.surface import Surface
-from fisheye_core.yaml_file import is_missing, is_number, read_mapping, shown, write_mapping
 from panorama_stitch.overlap.overlap_result import Overlap
 from panorama_stitch.overlap.overlap_settings import METHODS
 

@@ -1,6 +1,6 @@
 """Frames -> pair -> compose -> publish.
 
-Begin with `stitch_pipeline`, the recipe. `pairing` finds frames taken at the same time, `stale` goes
-on without a silent camera, `compositor_builder` measures and prepares in the background; `metrics`
-are what the pipeline reports.
+Begin with `stitch_pipeline`, the recipe. `pairing` finds frames taken at the same time, `stale`
+keeps what silent cameras showed last, `rig_state` is what is known of the cameras, and
+`compositor_builder` measures and prepares in the background; `metrics` are what is reported.
 """

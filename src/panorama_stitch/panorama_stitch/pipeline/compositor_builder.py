@@ -1,12 +1,14 @@
-"""CompositorBuilder: overlaps measured and compositors built, while frames go on with the former."""
+"""Overlaps measured and compositors built in the background, while the former stay in use."""
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Sequence
 from concurrent.futures import Future
 from dataclasses import replace
 from threading import Lock
 from time import monotonic
 from typing import NamedTuple
+
+import numpy as np
 
 from fisheye_core.background import Background
 from fisheye_core.errors import FisheyeError, OverlapError
@@ -15,78 +17,74 @@ from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.overlap.overlap_file import read_overlaps, write_overlaps
 from panorama_stitch.overlap.overlap_result import Overlap, side_by_side
 from panorama_stitch.pipeline.panorama_settings import PanoramaOutputSettings
-from panorama_stitch.pipeline.rig_state import Group, RigState
+from panorama_stitch.pipeline.rig_state import RigState
 
 _REMEMBERED = 5
-"""Pairs that an overlap is measured on."""
+"""Frame sets that an overlap is measured on."""
 _BETWEEN_REMEMBERED_S = 0.2
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 2.0, 60.0
 """Between two tries to find an overlap."""
+_NOTICES = 20
 
 
 class _Remembered(NamedTuple):
-    """Pictures of all cameras, and when the oldest of them was taken."""
+    """Images of all cameras, and when the oldest of them was taken."""
 
-    images: Group
+    images: Sequence[np.ndarray]
     stamp_ns: int
 
 
 class CompositorBuilder:
-    """Keeps the compositor fit for the cameras, the settings and the overlaps.
+    """Keeps the compositor up to date with the cameras, the settings and the overlaps.
 
     Attributes
     ----------
     compositor : Compositor or None
         In use now.
-    settings : PanoramaOutputSettings
-        Used the next time; `renew` says that it is due.
     trouble : str
-        Why there is no newer compositor; '' if there is nothing wrong.
+        Why there is no newer compositor; '' if nothing is wrong.
     """
 
-    def __init__(
-        self,
-        stitcher: RigState,
-        settings: PanoramaOutputSettings,
-        changed: Callable[[int], None],
-        warn: Callable[[str], None],
-    ):
-        """Start idle.
-
-        Parameters
-        ----------
-        stitcher
-            What is known of the cameras.
-        settings
-            To begin with.
-        changed
-            Called with the stamp, ns, of the pictures from which a new compositor is in use.
-        warn
-            Called with a sentence about what did not work.
-        """
+    def __init__(self, rig: RigState):
+        """Start idle; `rig` is what is known of the cameras."""
         self.compositor: Compositor | None = None
-        self.settings = settings
         self.trouble = ''
-        self._stitcher = stitcher
-        self._changed, self._warn = changed, warn
+        self._rig = rig
         self._background = Background(self._failed)
         self._lock = Lock()
         self._recent: deque[_Remembered] = deque(maxlen=_REMEMBERED)
+        self._notices: deque[str] = deque(maxlen=_NOTICES)
         self._remembered_s = 0.0
         self._due_s = 0.0
         self._pause_s = _FIRST_PAUSE_S
         self._job: Future | None = None
 
-    def remember(self, images: Group, stamp_ns: int) -> None:
-        """Take a group into account the next time that an overlap is measured."""
-        now = monotonic()
-        with self._lock:
-            is_first = not self._recent
-            if is_first:
-                self._due_s = 0.0
-            if is_first or now - self._remembered_s >= _BETWEEN_REMEMBERED_S:
-                self._remembered_s = now
-                self._recent.append(_Remembered(images, stamp_ns))
+    def take(
+        self,
+        images: Sequence[np.ndarray],
+        stamp_ns: int,
+        settings: PanoramaOutputSettings,
+        *,
+        is_live: bool,
+    ) -> None:
+        """Take a frame set into account, and start what is due unless something is in work.
+
+        Parameters
+        ----------
+        images, stamp_ns
+            One image of each camera, and when the oldest was taken.
+        settings
+            To be used from now on.
+        is_live
+            Whether no image is stale: only such are measured.
+        """
+        frames = _Remembered(images, stamp_ns)
+        if is_live:
+            self._remember(frames)
+        busy = self._job is not None and not self._job.done()
+        if not busy and self._rig.is_complete and monotonic() >= self._due_s:
+            self._due_s = float('inf')
+            self._job = self._background.do(self._prepare, frames, settings, is_live)
 
     def renew(self, *, forget: bool) -> None:
         """Have a new compositor built soon; `forget` what the cameras showed so far."""
@@ -95,18 +93,13 @@ class CompositorBuilder:
                 self._recent.clear()
         self._due_s = 0.0
 
-    def start_pending_job(self, images: Group, stamp_ns: int, *, is_live: bool) -> None:
-        """Start what is due, unless something is in work; `is_live`: no picture is stale."""
-        busy = self._job is not None and not self._job.done()
-        if not busy and self._stitcher.is_complete and monotonic() >= self._due_s:
-            self._due_s = float('inf')
-            self._job = self._background.do(self._prepare, _Remembered(images, stamp_ns), is_live)
-
-    def calibrate(self, method: str, save: bool) -> Future:
-        """Measure the overlaps anew on the groups that are remembered.
+    def calibrate(self, settings: PanoramaOutputSettings, method: str, save: bool) -> Future:
+        """Measure the overlaps anew on the frame sets that are remembered.
 
         Parameters
         ----------
+        settings
+            How to measure and compose.
         method
             One of `METHODS`; '' for that of the settings.
         save
@@ -118,88 +111,113 @@ class CompositorBuilder:
             Of a list of `Overlap`. Where no overlap is found, or none that can be believed, one
             that was found before stays in use. With a `FisheyeError` nothing has changed.
         """
-        return self._background.do(self._calibrate, method, save)
+        return self._background.do(self._calibrate, settings, method, save)
+
+    def tell(self, sentence: str) -> None:
+        """Note what did not work, for `take_notices`."""
+        self._notices.append(sentence)
+
+    def take_notices(self) -> list[str]:
+        """Return the sentences about what did not work since the last call."""
+        notices = list(dict.fromkeys(self._notices))
+        self._notices.clear()
+        return notices
 
     def stop(self) -> None:
         """End the thread."""
         self._background.stop()
 
+    def _remember(self, frames: _Remembered) -> None:
+        now_s = monotonic()
+        with self._lock:
+            is_first = not self._recent
+            if is_first:
+                self._due_s = 0.0
+            if is_first or now_s - self._remembered_s >= _BETWEEN_REMEMBERED_S:
+                self._remembered_s = now_s
+                self._recent.append(frames)
+
     def _failed(self, error: FisheyeError) -> None:
         self.trouble = str(error)
-        self._warn(self.trouble)
+        self.tell(self.trouble)
         self._wait(_FIRST_PAUSE_S)
 
     def _wait(self, pause_s: float) -> None:
         """Try again after a pause, or sooner where something was changed meanwhile."""
         self._due_s = min(self._due_s, monotonic() + pause_s)
 
-    def _prepare(self, newest: _Remembered, is_live: bool) -> None:
+    def _prepare(
+        self, newest: _Remembered, settings: PanoramaOutputSettings, is_live: bool
+    ) -> None:
         """Find overlaps if there are none, and build the compositor that uses them."""
-        stitcher, settings = self._stitcher, self.settings
-        if stitcher.overlaps is None:
+        rig = self._rig
+        if rig.overlaps is None:
             self._read(settings.overlap_file)
-        found = stitcher.overlaps and all(overlap.found for overlap in stitcher.overlaps)
-        groups = self._groups()
-        if not found and settings.auto_calibrate and groups:
-            surfaces = stitcher.surfaces
-            overlaps = self._measured(groups, settings.method)
-            if not stitcher.set_overlaps(overlaps, surfaces):
+        found = rig.overlaps and all(overlap.found for overlap in rig.overlaps)
+        remembered = self._remembered()
+        if not found and settings.auto_calibrate and remembered:
+            surfaces = rig.surfaces
+            overlaps = self._measured(remembered, settings, settings.method)
+            if not rig.set_overlaps(overlaps, surfaces):
                 self._due_s = 0.0
                 return
             if not all(overlap.found for overlap in overlaps):
                 self._wait(self._pause_s)
                 self._pause_s = min(2 * self._pause_s, _LONGEST_PAUSE_S)
         elif not found and settings.auto_calibrate and is_live:
-            # What was remembered was forgotten a moment ago; the next group can be measured.
+            # What was remembered was forgotten a moment ago; the next frame set can be measured.
             self._due_s = 0.0
             return
-        self._use(newest)
+        self._use(newest, settings)
 
-    def _calibrate(self, method: str, save: bool) -> list[Overlap]:
-        stitcher, settings = self._stitcher, self.settings
-        if not stitcher.is_complete:
+    def _calibrate(
+        self, settings: PanoramaOutputSettings, method: str, save: bool
+    ) -> list[Overlap]:
+        rig = self._rig
+        if not rig.is_complete:
             raise OverlapError('it is not known yet what every camera sees; are all running?')
         if save and not settings.overlap_file:
             raise OverlapError('overlap_file is empty; expected the file to save the overlap in')
-        groups, surfaces = self._groups(), stitcher.surfaces
-        measured = self._measured(groups, method or settings.method)
+        remembered, surfaces = self._remembered(), rig.surfaces
+        measured = self._measured(remembered, settings, method or settings.method)
         if settings.method != 'paper':
             pairs = zip(measured, surfaces[:-1], strict=True)
             measured = [_believed(new, surface, settings.min_confidence) for new, surface in pairs]
-        former = stitcher.overlaps or measured
+        former = rig.overlaps or measured
         overlaps = [
             new if new.found or not old.found else old
             for new, old in zip(measured, former, strict=True)
         ]
         if save and all(overlap.found for overlap in measured):
-            write_overlaps(settings.overlap_file, stitcher.cameras, surfaces, overlaps)
-        if not stitcher.set_overlaps(overlaps, surfaces):
+            write_overlaps(settings.overlap_file, rig.cameras, surfaces, overlaps)
+        if not rig.set_overlaps(overlaps, surfaces):
             raise OverlapError('the cameras changed meanwhile; expected them to stay as they are')
-        self._use(groups[-1])
+        self._use(remembered[-1], settings)
         return measured
 
-    def _groups(self) -> list[_Remembered]:
+    def _remembered(self) -> list[_Remembered]:
         with self._lock:
             return list(self._recent)
 
-    def _measured(self, groups: list[_Remembered], method: str) -> list[Overlap]:
-        pictures = [group.images for group in groups]
-        overlaps = self._stitcher.measure(pictures, self.settings, method)
-        return [replace(overlap, stamp_ns=groups[-1].stamp_ns) for overlap in overlaps]
+    def _measured(
+        self, remembered: list[_Remembered], settings: PanoramaOutputSettings, method: str
+    ) -> list[Overlap]:
+        images = [frames.images for frames in remembered]
+        overlaps = self._rig.measure(images, settings, method)
+        return [replace(overlap, stamp_ns=remembered[-1].stamp_ns) for overlap in overlaps]
 
-    def _use(self, newest: _Remembered) -> None:
-        self.compositor = self._stitcher.compositor(self.settings, newest.images)
+    def _use(self, newest: _Remembered, settings: PanoramaOutputSettings) -> None:
+        self.compositor = self._rig.compositor(settings, newest.images)
         self.trouble = ''
-        self._changed(newest.stamp_ns)
 
     def _read(self, path: str) -> None:
-        stitcher = self._stitcher
-        surfaces = stitcher.surfaces
+        rig = self._rig
+        surfaces = rig.surfaces
         try:
-            if overlaps := read_overlaps(path, stitcher.cameras, surfaces):
-                stitcher.set_overlaps(overlaps, surfaces)
+            if overlaps := read_overlaps(path, rig.cameras, surfaces):
+                rig.set_overlaps(overlaps, surfaces)
         except FisheyeError as error:
-            self._warn(f'{error}; the overlap is measured instead')
+            self.tell(f'{error}; the overlap is measured instead')
 
 
 def _believed(result: Overlap, left: Surface, needed: float) -> Overlap:

@@ -1,4 +1,4 @@
-"""What a live line tells of itself in numbers, and of clocks that differ in words."""
+"""What the pipeline reports of itself: numbers, and a sentence about clocks that differ."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -6,28 +6,27 @@ from itertools import pairwise
 import numpy as np
 
 from panorama_stitch.pipeline.stitch_pipeline import StitchPipeline
-from panorama_stitch.pipeline.panorama_settings import PanoramaOutputSettings
 
 _PERCENTILES = (50, 95, 99)
 _LONGEST_LATENCY_MS = 10_000.0
 """What is older was not taken by the clock of this machine."""
 
 
-def metrics(live: StitchPipeline) -> dict[str, float | str]:
-    """Give rates, losses, skew and the overlaps in use, each with its name and unit."""
-    cameras = live.stitcher.cameras
+def metrics(pipeline: StitchPipeline) -> dict[str, float | str]:
+    """Return rates, losses, skew and the overlaps in use, each with its name and unit."""
+    cameras = pipeline.rig.cameras
     values: dict[str, float | str] = {
-        'pairs overtaken': live.dropped,
-        'pairs broken': live.broken,
+        'pairs overtaken': pipeline.overtaken,
+        'pairs broken': pipeline.broken,
     }
     for camera in cameras:
-        values[f'{camera} rate Hz'] = live.rates[camera].hz
-        values[f'{camera} unpaired'] = live.pairing.unpaired[camera]
-    skews_ms = np.array(list(live.pairing.skews_ns)) / 1e6
+        values[f'{camera} rate Hz'] = pipeline.rates[camera].hz
+        values[f'{camera} unpaired'] = pipeline.pairing.unpaired[camera]
+    skews_ms = np.array(list(pipeline.pairing.skews_ns)) / 1e6
     if len(skews_ms):
         values['skew median ms'] = float(np.median(skews_ms))
         values['skew worst ms'] = float(skews_ms.max())
-    for (left, right), overlap in zip(pairwise(cameras), live.overlaps, strict=False):
+    for (left, right), overlap in zip(pairwise(cameras), pipeline.overlaps, strict=False):
         pair = f'{left}-{right}'
         values[f'{pair} overlap'] = f'found by {overlap.method}' if overlap.found else 'none'
         values[f'{pair} offset px'] = overlap.offset_x_px
@@ -35,7 +34,7 @@ def metrics(live: StitchPipeline) -> dict[str, float | str]:
     return values
 
 
-def latencies(latencies_ms: Sequence[float]) -> dict[str, float | str]:
+def latency_metrics(latencies_ms: Sequence[float]) -> dict[str, float | str]:
     """Return percentiles of the latency, or that the clocks differ where none can be known.
 
     Parameters
@@ -57,10 +56,11 @@ def latencies(latencies_ms: Sequence[float]) -> dict[str, float | str]:
     return {'latency': f"not known: the stamps are {apart} this machine's clock"}
 
 
-def unpaired(live: StitchPipeline, settings: PanoramaOutputSettings) -> str:
-    """Say that no frames belong together, and what is known of the cause."""
-    sentence = f'pictures come, but for {live.unpaired_s:.0f} s none that belong together'
-    spread_s = live.pairing.spread_ns / 1e9
+def unpaired_sentence(pipeline: StitchPipeline) -> str:
+    """Return the sentence that no frames belong together, with what is known of the cause."""
+    settings = pipeline.settings
+    sentence = f'pictures come, but for {pipeline.unpaired_s:.0f} s none that belong together'
+    spread_s = pipeline.pairing.spread_ns / 1e9
     if spread_s <= settings.max_pair_skew_s:
         return sentence
     limit = f'(max_pair_skew_s is {settings.max_pair_skew_s:g})'

@@ -18,7 +18,7 @@ _NAME = re.compile(r'[A-Za-z]\w*(/[A-Za-z]\w*)*', re.ASCII)
 
 @dataclass(frozen=True)
 class PanoramaOutputSettings(OverlapSettings):
-    """What both nodes that make panoramas can be told."""
+    """What both nodes that make panoramas can be told; all that the stitch node can."""
 
     cameras: tuple[str, ...] = setting(
         ('left', 'right'),
@@ -110,11 +110,6 @@ class PanoramaOutputSettings(OverlapSettings):
                     f'{name} has {len(values)} numbers; expected {pairs}, one for each '
                     'neighbouring pair'
                 )
-
-
-@dataclass(frozen=True)
-class StitchSettings(PanoramaOutputSettings):
-    """Settings of the stitch node."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The stitcher: views of the cameras, the overlaps between them, and the compositor they make."""
+"""What is known of the rig: what each camera shows and the overlaps between neighbours."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,12 +19,12 @@ from panorama_stitch.overlap.measure_overlap import measure_overlap
 from panorama_stitch.overlap.overlap_result import Overlap, side_by_side
 from panorama_stitch.pipeline.panorama_settings import PanoramaOutputSettings
 
-Group = Sequence[np.ndarray]
-"""One picture of each camera, taken at the same time."""
+Images = Sequence[np.ndarray]
+"""One image of each camera, taken at the same time."""
 
 
 class RigState:
-    """Turns what is known of the cameras into something that composes panoramas.
+    """What each camera shows, the overlaps between neighbours, and the compositor that follows.
 
     Attributes
     ----------
@@ -47,13 +47,13 @@ class RigState:
 
     @property
     def surfaces(self) -> list[Surface]:
-        """What the corrected pictures show, all with the focal length of the first."""
+        """What the corrected images show, all with the focal length of the first."""
         return [surface for _, surface in sorted(_with_one_focal(self._places).items())]
 
     def place(
         self, camera: str, source: Lens | Surface, surface: Surface, interpolation: str = 'linear'
     ) -> bool:
-        """Say what a camera's pictures show; whether that is news.
+        """Set what a camera's images show; return whether that is news.
 
         Overlaps that were measured on other surfaces are forgotten.
 
@@ -87,28 +87,28 @@ class RigState:
         return self.cameras.index(camera) in self._places
 
     def check(self, camera: str, image: np.ndarray) -> None:
-        """Raise an `ImageFormatError` for a picture of another size than the camera's."""
+        """Raise an `ImageFormatError` for a image of another size than the camera's."""
         place = self._places.get(self.cameras.index(camera))
         if place and image.shape[:2] != (place.source.height, place.source.width):
             raise ImageFormatError(
-                f'the picture of {camera} has {image.shape[1]}x{image.shape[0]} px; '
+                f'the image of {camera} has {image.shape[1]}x{image.shape[0]} px; '
                 f'expected {place.source.width}x{place.source.height} px'
             )
 
     def black(self, camera: str, channels: tuple[int, ...]) -> np.ndarray:
-        """Give a picture for a camera that never gave one, (height, width, *channels) uint8."""
+        """Return a image for a camera that never gave one, (height, width, *channels) uint8."""
         source = self._places[self.cameras.index(camera)].source
         return np.zeros((source.height, source.width, *channels), np.uint8)
 
     def measure(
-        self, groups: Sequence[Group], settings: PanoramaOutputSettings, method: str
+        self, frame_sets: Sequence[Images], settings: PanoramaOutputSettings, method: str
     ) -> list[Overlap]:
         """Measure the overlap of each neighbouring pair.
 
         Parameters
         ----------
-        groups
-            Pictures (height, width[, channels]) uint8, one of each camera in each group.
+        frame_sets
+            Images (height, width[, channels]) uint8, one of each camera in each set.
         settings
             How to measure.
         method
@@ -117,18 +117,18 @@ class RigState:
         Raises
         ------
         OverlapError
-            If there is no group.
+            If there is no frame set.
         ImageFormatError
-            If the pictures cannot be what the cameras are known to give.
+            If the images cannot be what the cameras are known to give.
         """
-        if not groups:
+        if not frame_sets:
             raise OverlapError('no pair of frames has come yet; are all cameras running?')
-        views = self._views(groups[0])
+        views = self._views(frame_sets[0])
         overlaps = []
         for i in range(len(views) - 1):
             pairs = [
-                (views[i].corrected(group[i]), views[i + 1].corrected(group[i + 1]))
-                for group in groups
+                (views[i].corrected(images[i]), views[i + 1].corrected(images[i + 1]))
+                for images in frame_sets
             ]
             overlap = measure_overlap(
                 pairs, views[i].surface, views[i + 1].surface, settings, method
@@ -138,7 +138,7 @@ class RigState:
         return overlaps
 
     def effective_overlaps(self, settings: PanoramaOutputSettings) -> list[Overlap]:
-        """Give the overlaps, with what was set by hand in place of what was measured."""
+        """Return the overlaps, with what was set by hand in place of what was measured."""
         pairs = len(self.cameras) - 1
         by_hand = [
             [nan] * pairs if all(map(isnan, values)) else values
@@ -149,21 +149,21 @@ class RigState:
         ]
         return [_set_by_hand(*entry) for entry in zip(measured, *by_hand, strict=True)]
 
-    def compositor(self, settings: PanoramaOutputSettings, group: Group) -> Compositor:
+    def compositor(self, settings: PanoramaOutputSettings, images: Images) -> Compositor:
         """Build what composes panoramas.
 
         Parameters
         ----------
         settings
             How to compose.
-        group
-            A picture of each camera, (height, width[, channels]) uint8: they show where corrected
-            pictures are black for good, where the seams fit best, and how bright they are.
+        images
+            One of each camera, (height, width[, channels]) uint8: they show where corrected
+            images are black for good, where the seams fit best, and how bright they are.
 
         Raises
         ------
         ImageFormatError
-            If a picture cannot be what its camera is known to give.
+            If a image cannot be what its camera is known to give.
         GeometryError
             If the surfaces cannot be joined.
         """
@@ -175,22 +175,22 @@ class RigState:
             crop=settings.crop if is_found else 'none',
             is_gain_compensated=settings.gain_compensation,
         )
-        return build_compositor(views_at_overlaps(self._views(group), overlaps), group, style)
+        return build_compositor(views_at_overlaps(self._views(images), overlaps), images, style)
 
-    def _views(self, group: Group) -> list[View]:
+    def _views(self, images: Images) -> list[View]:
         views = []
         for index, surface in sorted(_with_one_focal(self._places).items()):
-            picture, place = group[index], self._places[index]
-            self.check(self.cameras[index], picture)
+            image, place = images[index], self._places[index]
+            self.check(self.cameras[index], image)
             seen = None
             if isinstance(place.source, Surface):
-                seen = picture > 0 if picture.ndim == 2 else picture.any(axis=2)
+                seen = image > 0 if image.ndim == 2 else image.any(axis=2)
             views.append(View(place.source, surface, place.interpolation, seen=seen))
         return views
 
 
 class _Place(NamedTuple):
-    """What a camera's pictures show, and how they are drawn on which surface."""
+    """What a camera's images show, and how they are drawn on which surface."""
 
     source: Lens | Surface
     surface: Surface
@@ -198,7 +198,7 @@ class _Place(NamedTuple):
 
 
 def _with_one_focal(places: dict[int, _Place]) -> dict[int, Surface]:
-    """Give the surface of each place, enlarged or reduced to the focal length of the first."""
+    """Return the surface of each place, enlarged or reduced to the focal length of the first."""
     surfaces = {index: place.surface for index, place in places.items()}
     if 0 not in surfaces:
         return surfaces

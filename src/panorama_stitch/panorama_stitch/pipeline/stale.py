@@ -1,4 +1,7 @@
-"""Cameras that went silent: their last picture stays, but nobody may take it for a live one."""
+"""Cameras that went silent: their last image stays, but nobody may take it for a live one."""
+
+from collections.abc import Sequence
+from time import monotonic
 
 import cv2
 import numpy as np
@@ -11,13 +14,55 @@ _LETTER_PX = 22
 """Height of that font's letters at scale 1."""
 
 
-def dimmed(image: np.ndarray) -> np.ndarray:
-    """Give a darker copy of a picture."""
-    return cv2.convertScaleAbs(image, alpha=_BRIGHTNESS)
+class StaleCameras:
+    """The last image of each camera, and which cameras gave none of late.
+
+    Parameters
+    ----------
+    cameras
+        Their names; each counts as alive from now on.
+    """
+
+    def __init__(self, cameras: Sequence[str]):
+        self._images: dict[str, np.ndarray | None] = dict.fromkeys(cameras)
+        self._arrived_s = dict.fromkeys(cameras, monotonic())
+        self._dimmed: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+
+    @property
+    def missing(self) -> list[str]:
+        """Cameras of which there is no image yet."""
+        return [camera for camera, image in self._images.items() if image is None]
+
+    def note(self, camera: str, image: np.ndarray) -> None:
+        """Keep the newest image of a camera."""
+        self._images[camera] = image
+        self._arrived_s[camera] = monotonic()
+
+    def forget(self, camera: str) -> None:
+        """Drop the image of a camera that is another one now; its age stays."""
+        self._images[camera] = None
+
+    def ages_s(self, limit_s: float) -> dict[str, float]:
+        """Return the cameras that gave no image for longer than `limit_s`, with its age, s."""
+        now_s = monotonic()
+        ages_s = {camera: now_s - arrived for camera, arrived in self._arrived_s.items()}
+        return {camera: age for camera, age in ages_s.items() if age > limit_s}
+
+    def last(self, camera: str) -> np.ndarray | None:
+        """Return the last image of a camera; None if there is none."""
+        return self._images[camera]
+
+    def dim(self, camera: str, image: np.ndarray) -> np.ndarray:
+        """Return a darker copy of a stale image, made once for all the time that it stays."""
+        last, dark = self._dimmed.get(camera, (None, None))
+        if last is not image or dark is None:
+            dark = cv2.convertScaleAbs(image, alpha=_BRIGHTNESS)
+            self._dimmed[camera] = image, dark
+        return dark
 
 
 def write_age(panorama: np.ndarray, columns: tuple[int, int], camera: str, age_s: float) -> None:
-    """Write into the columns of a silent camera for how long there was no picture."""
+    """Write into the columns [begin, end) of a silent camera for how long there was no image."""
     begin, end = columns
     lines = [camera, f'no picture for {age_s:.0f} s']
     scale = _TEXT_SHARE * panorama.shape[0] / _LETTER_PX

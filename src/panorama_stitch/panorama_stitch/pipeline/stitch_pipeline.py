@@ -1,126 +1,209 @@
-"""The live line: frames -> pair -> compose -> publish, whatever the cameras do."""
+"""The stitch pipeline: frames -> pair -> compose -> publish, whatever the cameras do.
 
-from collections.abc import Callable
+`StitchPipeline.take` pairs each frame as it comes; `StitchPipeline.next` waits for the frames of
+all cameras that belong together; `Panorama.draw` composes them into the memory that gets
+published. Nothing here calls back: whoever owns the pipeline asks it.
+"""
+
+from collections.abc import Sequence
 from concurrent.futures import Future
+from dataclasses import dataclass
 from threading import Lock
 from time import monotonic, monotonic_ns
 from typing import NamedTuple
 
 import numpy as np
 
-from fisheye_core.latest_only import LatestOnlyWorker
-from fisheye_core.rate_meter import RateMeter
-from fisheye_core.encodings import alike
+from fisheye_core.encodings import alike, converted
 from fisheye_core.errors import FisheyeError
+from fisheye_core.latest_only import LatestOnlyQueue
+from fisheye_core.rate_meter import RateMeter
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.surface import Surface
 from panorama_stitch.compose.compositor import Compositor
-from panorama_stitch.pipeline.stale import dimmed
 from panorama_stitch.overlap.overlap_result import Overlap
-from panorama_stitch.pipeline.pairing import FramePairing
 from panorama_stitch.pipeline.compositor_builder import CompositorBuilder
+from panorama_stitch.pipeline.pairing import FramePairing
 from panorama_stitch.pipeline.panorama_settings import PanoramaOutputSettings
 from panorama_stitch.pipeline.rig_state import RigState
+from panorama_stitch.pipeline.stale import StaleCameras, write_age
 
 _WAITING = 2
-"""Groups that may wait to be composed: a moment without the processor loses none."""
+"""Frame sets that may wait to be composed: a moment without the processor loses none."""
 
 
 class _Frame(NamedTuple):
-    """A picture that waits for its partner, and when it was taken."""
+    """An image that waits for its partner, and when it was taken."""
 
     image: np.ndarray
     stamp_ns: int
 
 
-class _Last(NamedTuple):
-    """The last frame of a camera, and when it came."""
+class _FrameSet(NamedTuple):
+    """An image of each camera; those with an age are not live."""
 
-    image: np.ndarray | None
-    arrived_s: float
-
-
-class _Group(NamedTuple):
-    """A picture of each camera; those with an age are not live."""
-
-    images: list[np.ndarray]
+    images: Sequence[np.ndarray]
     stamp_ns: int
     ages_s: dict[str, float]
 
 
-class StitchPipeline:
-    """Stitches frames as they come.
-
-    Frames may be given from any thread. The newest group is composed in a thread of its own; an
-    older one that still waits then is dropped. Where a camera is silent, the others go on beside
-    its last picture, dimmed.
+@dataclass(frozen=True, eq=False)
+class Panorama:
+    """Frames that belong together and what draws them.
 
     Attributes
     ----------
-    stitcher : RigState
+    compositor
+        Draws them.
+    images
+        One of each camera, stale ones dimmed.
+    stamp_ns
+        When the oldest live one was taken.
+    encoding
+        Of the images and of the panorama.
+    stale
+        For each camera that is not live the columns [begin, end) that show it, and its age, s.
+    """
+
+    compositor: Compositor
+    images: Sequence[np.ndarray]
+    stamp_ns: int
+    encoding: str
+    stale: dict[str, tuple[tuple[int, int], float]]
+
+    @property
+    def surface(self) -> Surface:
+        """What the panorama shows."""
+        return self.compositor.layout.surface
+
+    def draw(self, out: np.ndarray) -> None:
+        """Draw into `out`, (surface.height, surface.width[, 3]) uint8.
+
+        Raises
+        ------
+        ImageFormatError
+            If an image is not of the size that its camera is known to give.
+        """
+        self.compositor.compose(self.images, out, are_live=not self.stale)
+        for camera, (columns, age_s) in self.stale.items():
+            write_age(out, columns, camera, age_s)
+
+
+class StitchPipeline:
+    """Makes panoramas of frames as they come, from any thread.
+
+    The newest frame set is composed; an older one that still waits then is dropped. Where a
+    camera is silent, the others go on beside its last image, dimmed.
+
+    Attributes
+    ----------
+    settings : PanoramaOutputSettings
+        In use; `apply` changes them.
+    rig : RigState
         What is known of the cameras.
     pairing : FramePairing
         What waits for its partner.
     rates : dict of RateMeter
         At which each camera's frames come.
     broken : int
-        Groups that could not be drawn.
+        Frame sets that could not be composed.
     """
 
-    def __init__(
-        self,
-        settings: PanoramaOutputSettings,
-        *,
-        publish: Callable[[Compositor, list[np.ndarray], int, dict[str, float]], None],
-        changed: Callable[[int], None],
-        warn: Callable[[str], None],
-    ):
-        """Start.
-
-        Parameters
-        ----------
-        settings
-            Also say which cameras there are.
-        publish
-            Called in the composing thread with the compositor, the pictures, the older stamp, and
-            the ages of those pictures that are not live, s.
-        changed
-            Called with the stamp, ns, of the pictures from which a new compositor is in use.
-        warn
-            Called with a sentence about what did not work.
-        """
-        self.stitcher = RigState(settings.cameras)
+    def __init__(self, settings: PanoramaOutputSettings):
+        """Start with settings, which also say which cameras there are."""
+        self.settings = settings
+        self.rig = RigState(settings.cameras)
         self.pairing = FramePairing(settings.cameras, round(settings.max_pair_skew_s * 1e9))
         self.rates = {camera: RateMeter() for camera in settings.cameras}
-        self._preparation = CompositorBuilder(self.stitcher, settings, changed, warn)
         self.broken = 0
-        self._publish, self._warn = publish, warn
+        self._builder = CompositorBuilder(self.rig)
+        self._stale = StaleCameras(settings.cameras)
+        self._waiting: LatestOnlyQueue[_FrameSet] = LatestOnlyQueue(_WAITING)
         self._lock = Lock()
-        self._last = {camera: _Last(None, monotonic()) for camera in settings.cameras}
         self._paired_s = monotonic()
+        self._color = ''
         self._dimensions = 0
-        self._dark: dict[str, tuple[np.ndarray, np.ndarray]] = {}
-        self._composing = LatestOnlyWorker(self._compose, 'compose', _WAITING)
+
+    def take(self, camera: str, stamp_ns: int, image: np.ndarray, encoding: str) -> None:
+        """Take a frame of a camera; nobody may write to it afterwards.
+
+        The first one in colour decides the order of the panorama's channels.
+
+        Raises
+        ------
+        ImageFormatError
+            If it is not of the size that the camera is known to give.
+        """
+        self.rig.check(camera, image)
+        self.rates[camera].count()
+        with self._lock:
+            if encoding != 'mono8':
+                self._color = self._color or encoding
+                image = converted(image, encoding, self._color)
+            self._stale.note(camera, image)
+            paired = self._paired(camera, _Frame(image, stamp_ns))
+            if paired := paired or self._beside_stale(camera, stamp_ns):
+                self._paired_s = monotonic()
+                self._waiting.put(paired)
+
+    def next(self) -> Panorama | None:
+        """Wait for frames that can be composed; return None when stopped."""
+        while (frames := self._waiting.get()) is not None:
+            try:
+                if panorama := self._panorama(frames):
+                    return panorama
+            except FisheyeError as error:
+                self.broken += 1
+                self._builder.tell(f'a pair of frames was dropped: {error}')
+        return None
+
+    def place(
+        self, camera: str, source: Lens | Surface, surface: Surface, interpolation: str = 'linear'
+    ) -> None:
+        """Set what a camera's images show; parameters and errors as of `RigState.place`."""
+        with self._lock:
+            if self.rig.place(camera, source, surface, interpolation):
+                last = self._stale.last(camera)
+                if last is not None and last.shape[:2] != (source.height, source.width):
+                    self.pairing.clear()
+                    self._waiting.clear()
+                    self._stale.forget(camera)
+                self._builder.renew(forget=True)
+
+    def apply(self, settings: PanoramaOutputSettings) -> None:
+        """Use other settings from the next frames on."""
+        with self._lock:
+            if settings.pair_by != self.settings.pair_by:
+                self.pairing.clear()
+            self.settings = settings
+            self.pairing.max_skew_ns = round(settings.max_pair_skew_s * 1e9)
+        self._builder.renew(forget=False)
+
+    def calibrate(self, method: str, save: bool) -> Future:
+        """Measure the overlaps anew, off the frame path; as of `CompositorBuilder.calibrate`."""
+        return self._builder.calibrate(self.settings, method, save)
+
+    def stop(self) -> None:
+        """End `next` and the background work."""
+        self._waiting.close()
+        self._builder.stop()
 
     @property
     def compositor(self) -> Compositor | None:
-        """What composes the panoramas now, None before the first."""
-        return self._preparation.compositor
+        """What composes the panoramas now; None before the first."""
+        return self._builder.compositor
 
     @property
     def overlaps(self) -> list[Overlap]:
-        """What is in use between neighbours, [] before the first panorama."""
-        if self.compositor is None:
-            return []
-        return self.stitcher.effective_overlaps(self._preparation.settings)
+        """What is in use between neighbours; [] before the first panorama."""
+        return self.rig.effective_overlaps(self.settings) if self.compositor else []
 
     @property
     def trouble(self) -> str:
-        """Why no newer panorama can be laid out; '' if there is nothing wrong."""
-        missing = [camera for camera, last in self._last.items() if last.image is None]
-        if self.compositor is None and missing:
+        """Why no newer panorama can be laid out; '' if nothing is wrong."""
+        if self.compositor is None and (missing := self._stale.missing):
             return f'waiting for pictures of {", ".join(missing)}'
-        return self._preparation.trouble
+        return self._builder.trouble
 
     @property
     def unpaired_s(self) -> float:
@@ -128,114 +211,64 @@ class StitchPipeline:
         return 0.0 if self.ages_s() else monotonic() - self._paired_s
 
     @property
-    def dropped(self) -> int:
-        """Groups that were overtaken by a newer one."""
-        return self._composing.dropped
+    def overtaken(self) -> int:
+        """Frame sets that were dropped because a newer one came."""
+        return self._waiting.dropped
 
     def ages_s(self) -> dict[str, float]:
-        """Give the cameras that are stale, each with the age of its last frame, s."""
-        now, limit = monotonic(), self._preparation.settings.stale_after_s
-        ages = {camera: now - last.arrived_s for camera, last in self._last.items()}
-        return {camera: age for camera, age in ages.items() if age > limit}
+        """Return the cameras that are stale, each with the age of its last frame, s."""
+        return self._stale.ages_s(self.settings.stale_after_s)
 
-    def take(self, camera: str, stamp_ns: int, image: np.ndarray) -> None:
-        """Take a frame of a camera; nobody may write to it afterwards.
+    def take_notices(self) -> list[str]:
+        """Return the sentences about what did not work since the last call."""
+        return self._builder.take_notices()
 
-        Raises
-        ------
-        ImageFormatError
-            If it is not of the size that the camera is known to give.
-        """
-        self.stitcher.check(camera, image)
-        self.rates[camera].count()
-        with self._lock:
-            self._last[camera] = _Last(image, monotonic())
-            by_stamp = self._preparation.settings.pair_by == 'stamp'
-            when_ns = stamp_ns if by_stamp else monotonic_ns()
-            pair = self.pairing.add(camera, when_ns, _Frame(image, stamp_ns))
-            if pair is not None:
-                self._paired_s = monotonic()
-                frames = [member.frame for member in pair]
-                images, stamps_ns = zip(*frames, strict=True)
-                self._composing.put(_Group(list(images), min(stamps_ns), {}))
-            elif ages_s := self.ages_s():
-                self._paired_s = monotonic()
-                self._go_on_without(ages_s, camera, stamp_ns)
+    def _paired(self, camera: str, frame: _Frame) -> _FrameSet | None:
+        """Pair a frame; return the frame set that it completes."""
+        by_stamp = self.settings.pair_by == 'stamp'
+        when_ns = frame.stamp_ns if by_stamp else monotonic_ns()
+        paired = self.pairing.add(camera, when_ns, frame)
+        if paired is None:
+            return None
+        images, stamps_ns = zip(*(member.frame for member in paired), strict=True)
+        return _FrameSet(images, min(stamps_ns), {})
 
-    def place(
-        self, camera: str, source: Lens | Surface, surface: Surface, interpolation: str = 'linear'
-    ) -> None:
-        """Say what a camera's pictures show; parameters and errors as `RigState.place`."""
-        with self._lock:
-            if self.stitcher.place(camera, source, surface, interpolation):
-                last = self._last[camera]
-                size = source.height, source.width
-                if last.image is not None and last.image.shape[:2] != size:
-                    self.pairing.clear()
-                    self._last[camera] = _Last(None, last.arrived_s)
-                self._preparation.renew(forget=True)
+    def _beside_stale(self, camera: str, stamp_ns: int) -> _FrameSet | None:
+        """Show what lives beside the last images of the rest; the first living sets the pace."""
+        ages_s = self.ages_s()
+        living = [name for name in self.rig.cameras if name not in ages_s]
+        if not ages_s or camera != living[0] or not self.rig.is_complete:
+            return None
+        channels = self._stale.last(camera).shape[2:]
+        images = []
+        for name in self.rig.cameras:
+            last = self._stale.last(name)
+            images.append(self.rig.black(name, channels) if last is None else last)
+        return _FrameSet(images, stamp_ns, ages_s)
 
-    def apply(self, settings: PanoramaOutputSettings) -> None:
-        """Use other settings from the next frames on."""
-        with self._lock:
-            if settings.pair_by != self._preparation.settings.pair_by:
-                self.pairing.clear()
-            self._preparation.settings = settings
-            self.pairing.max_skew_ns = round(settings.max_pair_skew_s * 1e9)
-        self._preparation.renew(forget=False)
-
-    def calibrate(self, method: str, save: bool) -> Future:
-        """Measure the overlaps anew, off the frame path; as `CompositorBuilder.calibrate`."""
-        return self._preparation.calibrate(method, save)
-
-    def stop(self) -> None:
-        """End the threads."""
-        self._composing.stop()
-        self._preparation.stop()
-
-    def _go_on_without(self, ages_s: dict[str, float], camera: str, stamp_ns: int) -> None:
-        """Show what lives beside the last pictures of the rest; the first living sets the pace."""
-        living = [name for name in self._last if name not in ages_s]
-        if camera != living[0] or not self.stitcher.is_complete:
-            return
-        channels = self._last[camera].image.shape[2:]
-        images = [
-            self.stitcher.black(name, channels) if last.image is None else last.image
-            for name, last in self._last.items()
-        ]
-        self._composing.put(_Group(images, stamp_ns, ages_s))
-
-    def _compose(self, group: _Group) -> None:
-        is_live = not group.ages_s
-        try:
-            # They may have waited while a camera became another one.
-            for camera, image in zip(self.stitcher.cameras, group.images, strict=True):
-                self.stitcher.check(camera, image)
-            images = alike(group.images)
-            if images[0].ndim != self._dimensions:
-                self._dimensions = images[0].ndim
-                self._preparation.renew(forget=True)
-            if is_live:
-                self._preparation.remember(images, group.stamp_ns)
-            self._preparation.start_pending_job(images, group.stamp_ns, is_live=is_live)
-            if self.compositor is None:
-                return
-            if group.ages_s:
-                images = alike(
-                    [
-                        self._dimmed(camera, image) if camera in group.ages_s else image
-                        for camera, image in zip(self.stitcher.cameras, group.images, strict=True)
-                    ]
-                )
-            self._publish(self.compositor, images, group.stamp_ns, group.ages_s)
-        except FisheyeError as error:
-            self.broken += 1
-            self._warn(f'a pair of frames was dropped: {error}')
-
-    def _dimmed(self, camera: str, image: np.ndarray) -> np.ndarray:
-        """Dim a stale picture, once for all the time that it stays."""
-        last, dark = self._dark.get(camera, (None, None))
-        if last is not image:
-            dark = dimmed(image)
-            self._dark[camera] = image, dark
-        return dark
+    def _panorama(self, frames: _FrameSet) -> Panorama | None:
+        """Join frames and the compositor in use; None where there is none yet."""
+        cameras = self.rig.cameras
+        for camera, image in zip(cameras, frames.images, strict=True):
+            self.rig.check(camera, image)  # they may have waited while a camera became another one
+        images = alike(frames.images)
+        if images[0].ndim != self._dimensions:
+            self._dimensions = images[0].ndim
+            self._builder.renew(forget=True)
+        self._builder.take(images, frames.stamp_ns, self.settings, is_live=not frames.ages_s)
+        compositor = self.compositor
+        if compositor is None or not compositor.fits(images):
+            return None
+        if frames.ages_s:
+            images = alike(
+                [
+                    self._stale.dim(camera, image) if camera in frames.ages_s else image
+                    for camera, image in zip(cameras, frames.images, strict=True)
+                ]
+            )
+        stale = {
+            camera: (compositor.layout.shown_columns(cameras.index(camera)), age_s)
+            for camera, age_s in frames.ages_s.items()
+        }
+        encoding = 'mono8' if images[0].ndim == 2 else self._color
+        return Panorama(compositor, images, frames.stamp_ns, encoding, stale)

@@ -1,0 +1,50 @@
+"""Overlaps to messages."""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from itertools import pairwise
+from math import degrees
+
+from fisheye_msgs.msg import Overlap, Particle
+from std_msgs.msg import Header
+
+from fisheye_bridge.stamps import stamp_of
+from fisheye_geometry.surface import Surface
+from panorama_stitch.overlap.overlap_result import Overlap as OverlapResult
+from panorama_stitch.overlap.overlap_result import yaw_between_rad
+from panorama_stitch.pipeline.rig_state import RigState
+
+
+def overlap_messages(
+    results: Sequence[OverlapResult], rig: RigState, frame_id: str
+) -> list[Overlap]:
+    """Return a message for the overlap of each pair of a rig, in its order."""
+    pairs = zip(results, pairwise(rig.cameras), pairwise(rig.surfaces), strict=True)
+    return [_message(result, names, surfaces, frame_id) for result, names, surfaces in pairs]
+
+
+def _message(
+    result: OverlapResult,
+    names: tuple[str, str],
+    surfaces: tuple[Surface, Surface],
+    frame_id: str,
+) -> Overlap:
+    return Overlap(
+        header=Header(stamp=stamp_of(result.stamp_ns), frame_id=frame_id),
+        left_camera=names[0],
+        right_camera=names[1],
+        method=result.method,
+        found=result.found,
+        offset_x_px=result.offset_x_px,
+        offset_y_px=result.offset_y_px,
+        offset_deg=degrees(yaw_between_rad(result.offset_x_px, *surfaces)),
+        pitch_deg=degrees(result.turn.pitch_rad),
+        roll_deg=degrees(result.turn.roll_rad),
+        overlap_px=result.overlap_px,
+        confidence=result.confidence,
+        min_correlation_value=result.min_correlation_value,
+        left_particles=[Particle(**asdict(particle)) for particle in result.left_particles],
+        right_particles=[Particle(**asdict(particle)) for particle in result.right_particles],
+        left_match=result.left_match,
+        right_match=result.right_match,
+    )
