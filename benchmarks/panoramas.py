@@ -18,8 +18,8 @@ import cv2
 import numpy as np
 from pairs import DATA
 
-from fisheye_geometry.camera_file import read_camera
 from fisheye_core.errors import FisheyeError
+from fisheye_geometry.camera_file import read_camera
 from fisheye_geometry.image_circle import ImageCircle
 from fisheye_geometry.level import DOWN
 from fisheye_geometry.rig_solution import solve_rig

@@ -1,49 +1,78 @@
-"""Handing things to a slower thread: only the newest wait."""
+"""Handing items to a slower thread: only the newest ones wait."""
 
 from collections import deque
 from collections.abc import Callable
 from threading import Condition, Thread
-from typing import Any
+from typing import Generic, TypeVar
+
+_Item = TypeVar('_Item')
 
 
-class LatestOnlyWorker:
-    """A thread that does something with the newest things put in, and never falls behind.
+class LatestOnlyQueue(Generic[_Item]):
+    """A queue that never falls behind: where too many items wait, the oldest is dropped.
 
     Attributes
     ----------
-    dropped
-        Things that newer ones replaced before their turn.
+    dropped : int
+        Items that newer ones replaced before their turn.
     """
 
-    def __init__(self, work: Callable[[Any], None], name: str, waiting: int = 1):
-        """Start; so many things may be `waiting` while one is in work."""
+    def __init__(self, waiting: int = 1):
+        """Start empty; at most `waiting` items wait."""
         self.dropped = 0
-        self._work = work
-        self._waiting = deque(maxlen=waiting)
-        self._is_stopped = False
+        self._waiting: deque[_Item] = deque(maxlen=waiting)
+        self._is_closed = False
         self._changed = Condition()
+
+    def put(self, item: _Item) -> None:
+        """Add an item, in place of the oldest where too many wait."""
+        with self._changed:
+            self.dropped += len(self._waiting) == self._waiting.maxlen
+            self._waiting.append(item)
+            self._changed.notify()
+
+    def get(self) -> _Item | None:
+        """Wait for the oldest item; return None once the queue is closed."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._is_closed or self._waiting)
+            return None if self._is_closed else self._waiting.popleft()
+
+    def clear(self) -> None:
+        """Drop what waits, uncounted."""
+        with self._changed:
+            self._waiting.clear()
+
+    def close(self) -> None:
+        """Have each `get`, now and later, return None."""
+        with self._changed:
+            self._is_closed = True
+            self._changed.notify_all()
+
+
+class LatestOnlyWorker(Generic[_Item]):
+    """A thread that works on the newest items and never falls behind."""
+
+    def __init__(self, work: Callable[[_Item], None], name: str, waiting: int = 1):
+        """Start; at most `waiting` items wait while one is in work."""
+        self._work = work
+        self._queue: LatestOnlyQueue[_Item] = LatestOnlyQueue(waiting)
         self._thread = Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
-    def put(self, thing: Any) -> None:
-        """Have a thing worked on, in place of the oldest where too many wait."""
-        with self._changed:
-            self.dropped += len(self._waiting) == self._waiting.maxlen
-            self._waiting.append(thing)
-            self._changed.notify()
+    @property
+    def dropped(self) -> int:
+        """Items that newer ones replaced before their turn."""
+        return self._queue.dropped
+
+    def put(self, item: _Item) -> None:
+        """Have an item worked on, in place of the oldest where too many wait."""
+        self._queue.put(item)
 
     def stop(self) -> None:
         """Finish what is in work, and no more."""
-        with self._changed:
-            self._is_stopped = True
-            self._changed.notify()
+        self._queue.close()
         self._thread.join()
 
-    def _run(self):
-        while True:
-            with self._changed:
-                self._changed.wait_for(lambda: self._is_stopped or self._waiting)
-                if self._is_stopped:
-                    return
-                thing = self._waiting.popleft()
-            self._work(thing)
+    def _run(self) -> None:
+        while (item := self._queue.get()) is not None:
+            self._work(item)

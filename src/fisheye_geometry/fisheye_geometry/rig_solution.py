@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fisheye_geometry.attitude import LEVEL, Attitude
 from fisheye_core.errors import GeometryError
+from fisheye_geometry.attitude import LEVEL, Attitude
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.level import Mount, levelled
 from fisheye_geometry.rig import Rig, RigCamera, chain, pairs_of

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fisheye_geometry.attitude import Attitude, angle_between
 from fisheye_core.errors import GeometryError
+from fisheye_geometry.attitude import Attitude, angle_between
 from fisheye_geometry.lens import make_lens
 from fisheye_geometry.level import Mount
 from fisheye_geometry.rig_solution import solve_rig

@@ -11,9 +11,9 @@ import pytest
 
 from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens
-from fisheye_geometry.attitude import Attitude
 from fisheye_core.errors import FisheyeError
 from fisheye_core.settings import rules
+from fisheye_geometry.attitude import Attitude
 from panorama_stitch.pipeline.panorama_settings import PanoramaSettings, StitchSettings
 from panorama_stitch.pipeline.rig_state import RigState
 

@@ -311,42 +311,43 @@ def test_a_lens_that_changes_with_each_frame_stops_no_panorama(make_line, pictur
     count = len(line.published)
     for index in range(1, 21):
         lens = replace(LENS, focal_x_px=LENS.focal_x_px + 0.01 * index)
-        line.live.place('left', lens, SETTINGS.surface_of(lens))
+        line.pipeline.place('left', lens, SETTINGS.surface_of(lens))
         line.feed(pictures, lambda seen=count + index: len(line.published) >= seen, 'the next one')
-    assert line.live.unpaired_s < SETTINGS.stale_after_s
+    assert line.pipeline.unpaired_s < SETTINGS.stale_after_s
 
 
 def test_the_published_rule_asked_for_once_ruins_no_rig(make_line, pictures):
     line = make_line(replace(SETTINGS, min_confidence=0.5))
     line.feed(pictures, lambda: line.published, 'a panorama')
-    good = effective_overlaps(line)
-    (asked,) = line.live.calibrate('paper', save=False).result(DEADLINE_S)
+    good = overlap_in_use(line)
+    (asked,) = line.pipeline.calibrate('paper', save=False).result(DEADLINE_S)
     assert (asked.method, asked.found) == ('paper', False)
     assert asked.confidence < 0.5
     assert 'the most similar particles put the right view at' in asked.message
     assert '0.50 is needed (with the parameter method:=paper' in asked.message
-    assert effective_overlaps(line) == good
-    line.live.apply(replace(SETTINGS, method='paper', min_confidence=0.5))
-    (asked,) = line.live.calibrate('', save=False).result(DEADLINE_S)
+    assert overlap_in_use(line) == good
+    line.pipeline.apply(replace(SETTINGS, method='paper', min_confidence=0.5))
+    (asked,) = line.pipeline.calibrate('', save=False).result(DEADLINE_S)
     assert asked.found
-    assert effective_overlaps(line) == asked
+    assert overlap_in_use(line) == asked
 
 
 def test_a_setting_that_changes_while_an_overlap_is_sought_need_not_wait(make_line, pictures):
     line = make_line(replace(SETTINGS, stale_after_s=60.0))
     dark = {camera: np.zeros_like(picture) for camera, picture in pictures.items()}
-    measure, is_measuring, start_pending_job = line.live.stitcher.measure, threading.Event(), threading.Event()
+    measure = line.pipeline.rig.measure
+    is_measuring, resume = threading.Event(), threading.Event()
 
     def measure_late(*arguments):
         is_measuring.set()
-        start_pending_job.wait(DEADLINE_S)
+        resume.wait(DEADLINE_S)
         return measure(*arguments)
 
-    line.live.stitcher.measure = measure_late
+    line.pipeline.rig.measure = measure_late
     line.feed(dark, is_measuring.is_set, 'a search')
-    line.live.apply(replace(SETTINGS, stale_after_s=60.0, crop='none', feather_deg=3.0))
+    line.pipeline.apply(replace(SETTINGS, stale_after_s=60.0, crop='none', feather_deg=3.0))
     is_measuring.clear()
-    start_pending_job.set()
+    resume.set()
     begin = time.monotonic()
     line.feed(dark, is_measuring.is_set, 'the next search')
     assert time.monotonic() - begin < 2.0, 'the pause between two searches'

@@ -16,7 +16,6 @@ from fisheye_bridge.projection import projection_of
 from fisheye_bridge.qos import IMAGE, LATCHED
 from fisheye_bridge.stamps import stamp_of
 from fisheye_geometry.surface import Surface
-from fisheye_testing.image_message import to_message
 from panorama_viewer.snapshot_node import SnapshotNode, main, parse
 
 SURFACE = Surface('cylindrical', 32, 12, 10.0, 15.5, 5.5)

@@ -10,9 +10,9 @@ fades into the other.
 import cv2
 import numpy as np
 
+from fisheye_core.parallel import run_parallel
 from panorama_stitch.compose.blend import Feather
 from panorama_stitch.compose.optical_flow import OpticalFlow
-from fisheye_core.parallel import run_parallel
 
 _ROUNDS = 3
 """Of the fixed point that finds what part of a view comes to lie at a pixel."""

@@ -2,6 +2,7 @@
 
 from fisheye_bridge.diagnostics import Report
 from fisheye_bridge.running import run
+from fisheye_capture.capture_settings import CameraSettings
 from panorama_stitch.nodes.base_node import PanoramaBase
 from panorama_stitch.nodes.camera_input import camera_input
 from panorama_stitch.pipeline.panorama_settings import PanoramaSettings

@@ -20,7 +20,7 @@ from panorama_stitch.pipeline.panorama_settings import PanoramaOutputSettings
 class StitchNode(PanoramaBase):
     """CAMERA/image_rect and CAMERA/projection of each camera to panorama/image."""
 
-    SETTINGS = (('', StitchSettings),)
+    SETTINGS = (('', PanoramaOutputSettings),)
 
     def __init__(self, **kwargs):
         super().__init__('stitch', PanoramaOutputSettings, **kwargs)
