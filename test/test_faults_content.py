@@ -18,8 +18,8 @@ from fisheye_capture.synthetic import synthetic_lens
 from fisheye_core.errors import CameraFileError, FisheyeError
 from fisheye_geometry.camera_file import Camera, read_camera, write_camera
 from fisheye_undistort.undistort_settings import UndistortSettings
-from panorama_stitch.overlap.overlap_file import read_overlaps, write_overlaps
 from panorama_stitch.overlap.measure_overlap import Overlap
+from panorama_stitch.overlap.overlap_file import read_overlaps, write_overlaps
 
 EXAMPLES = 3000 if os.environ.get('LONG') else 300
 LENS = synthetic_lens(640, 480, 2.97)

@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from fisheye_msgs.msg import Projection
-from fisheye_testing.free_running import Camera
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
-from fisheye_testing.rig import SIDES, wait_for
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 

@@ -7,7 +7,7 @@ package_name = 'panorama_stitch'
 setup(
     name=package_name,
     version='0.1.0',
-    packages=[package_name, f'{package_name}.compose', f'{package_name}.overlap'],
+    packages=find_packages(include=[f'{package_name}*']),
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),

@@ -4,6 +4,7 @@ import os
 import re
 from pathlib import Path
 
+from fisheye_capture.capture_settings import CaptureSettings
 from fisheye_capture.files import (
     PictureSource,
     SequenceSource,
@@ -12,7 +13,6 @@ from fisheye_capture.files import (
 )
 from fisheye_capture.live import DeviceSource
 from fisheye_capture.network_request import SCHEMES
-from fisheye_capture.capture_settings import CaptureSettings
 from fisheye_capture.source import Source, shown_source
 from fisheye_capture.stream import StreamSource
 from fisheye_capture.synthetic import SyntheticSource

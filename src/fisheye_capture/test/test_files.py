@@ -3,12 +3,11 @@
 import cv2
 import numpy as np
 import pytest
-from fisheye_testing.odd_pictures import huge_png, turned_video
 
 from fisheye_capture.source import SourceEndedError
 from fisheye_capture.sources import open_source
 from fisheye_core.errors import SourceError
-from fisheye_testing.odd_pictures import huge_png
+from fisheye_testing.odd_pictures import huge_png, turned_video
 
 CODING_LOSS = 6
 """Grey levels by which a video's coding may miss a plain picture."""

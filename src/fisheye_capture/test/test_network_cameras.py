@@ -6,13 +6,13 @@ import time
 from argparse import Namespace
 from pathlib import Path
 
-from fisheye_testing import network_camera
 import numpy as np
 import pytest
-from fisheye_testing.painted_time import age_ms, read_image
 
 from fisheye_capture.source import SourceLostError
 from fisheye_capture.stream import StreamSource
+from fisheye_testing import network_camera
+from fisheye_testing.painted_time import age_ms, read_image
 
 RATE_HZ = 20.0
 PERIOD_MS = 1000 / RATE_HZ

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from fisheye_geometry.annular_lens import AnnularLens
 from fisheye_core.errors import CalibrationError
+from fisheye_geometry.annular_lens import AnnularLens
 from fisheye_geometry.fisheye_lens import FisheyeLens
 from fisheye_geometry.lens_model import MAX_PICTURE_SIDE_PX, Lens
 from fisheye_geometry.pinhole_lens import PinholeLens

@@ -24,6 +24,7 @@ import av
 import cv2
 import numpy as np
 from av.video.frame import PictureType
+
 from fisheye_testing.painted_time import paint
 
 HOST = '127.0.0.1'

@@ -357,11 +357,16 @@ def test_what_was_made_for_former_settings_is_let_go(make_line, pictures):
     line = make_line()
     line.feed(pictures, lambda: line.published, 'a panorama')
     for hfov_deg in range(140, 152):
-        settings, count = replace(SETTINGS, hfov_deg=float(hfov_deg)), len(line.changed)
-        line.live.apply(settings)
+        settings = replace(SETTINGS, hfov_deg=float(hfov_deg))
+        former = line.pipeline.compositor
+        line.pipeline.apply(settings)
         for camera in settings.cameras:
-            line.live.place(camera, LENS, settings.surface_of(LENS))
-        line.feed(pictures, lambda seen=count: len(line.changed) > seen, 'another compositor')
+            line.pipeline.place(camera, LENS, settings.surface_of(LENS))
+        line.feed(
+            pictures,
+            lambda seen=former: id(line.pipeline.compositor) != seen,
+            'another compositor',
+        )
     gc.collect()
     alive = [type(thing) for thing in gc.get_objects()]
     lines = 1 + alive.count(Line)

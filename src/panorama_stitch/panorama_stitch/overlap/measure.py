@@ -62,7 +62,7 @@ class Trial:
         return float(self.votes.weight[self.fit.far].sum())
 
     @property
-    def run_parallel(self) -> float:
+    def share(self) -> float:
         """The same, of all that voted."""
         return self.far / max(float(self.votes.weight.sum()), 1e-9)
 
