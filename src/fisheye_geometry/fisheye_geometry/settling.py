@@ -5,8 +5,8 @@ from time import monotonic
 
 _AT_ONCE = 3
 """Changes that are followed at once: a driver may correct itself."""
-_FIRST_PAUSE_S = 2.0
-"""After these, doubled with each further change."""
+_FIRST_PAUSE_S = 5.0
+"""After these, doubled with each further change; time to measure the overlap on a busy machine."""
 _REMEMBERED = 8
 _FORGOTTEN_AFTER_S = 60.0
 
