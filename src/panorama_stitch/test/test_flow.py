@@ -18,6 +18,8 @@ FAITHFUL_DB = 30.0
 GAIN_DB = 5.0
 SHOWN = 0.8, 1.15
 """The share of a thing that is seen: it is squeezed by 12 px in 112, and its outlines waver."""
+COMING_BACK = 30
+"""Frames in which flow fades in again."""
 STEADY = 1.1
 SAME_LEVELS = 3
 """At its edges a view has hardly been warped."""
@@ -154,7 +156,7 @@ def test_economy_is_a_feather_from_which_flow_comes_back():
     economical = blended(blend, left, right, economical=True)
     np.testing.assert_array_equal(economical, blended(feather(), left, right))
     distances = [np.abs(np.float32(economical) - target).mean()]
-    for _ in range(10):
+    for _ in range(COMING_BACK):
         out = blended(blend, left, right)
         distances.append(np.abs(np.float32(out) - target).mean())
     assert distances[1] > 0.5 * distances[0]

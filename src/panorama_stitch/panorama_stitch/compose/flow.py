@@ -16,11 +16,13 @@ from panorama_stitch.compose.optical_flow import OpticalFlow
 
 _ROUNDS = 3
 """Of the fixed point that finds what part of a view comes to lie at a pixel."""
-_LEAST_TRUST, _FULL_TRUST = 0.25, 0.4
-"""Shares of a band of rows in which flows agree: with less they are wrong all over it."""
+_LEAST_TRUST, _FULL_TRUST = 0.4, 0.55
+"""Shares of what differs in a band of rows in which flows agree: with less all of it is wrong."""
+_LEAST_COUNT = 0.02
+"""Share of a band that is taken to agree anyway, so that little that differs counts little."""
 _BAND_SHARE = 0.3
 """Height of a band in units of the strip's."""
-_TRUST_PER_FRAME = 0.1
+_TRUST_PER_FRAME = 0.05
 """Share of the way to its new value that the trust in a band goes at once."""
 _EDGE_SIDE = 5
 _EDGE_ROWS = 15
@@ -66,8 +68,8 @@ class Flow:
         self._used = np.empty_like(self._strength)
         self._judged = (both > 0.5).astype(np.uint8)
         self._band = 1, max(1, round(_BAND_SHARE * len(both[flow.inner]))) | 1
-        self._area = np.maximum(self._over_band(self._judged[flow.inner]), 1e-3)
-        self._agrees = np.empty_like(self._judged)
+        self._area = self._over_band(self._judged[flow.inner])
+        self._agrees, self._counts = np.empty((2, *both.shape), np.uint8)
         self._trust: np.ndarray | None = None
 
     def __call__(
@@ -108,9 +110,12 @@ class Flow:
 
     def _gate(self) -> np.ndarray:
         """(height, 1, 1): how far the flow of each row is used."""
-        self._flow.agrees(self._agrees)
-        self._agrees &= self._judged
-        agreeing = self._over_band(self._agrees[self._flow.inner]) / self._area
+        inner, agrees, counts = self._flow.inner, self._agrees, self._counts
+        self._flow.judge(agrees, counts)
+        agrees &= self._judged
+        counts &= self._judged
+        agreeing = self._over_band(agrees[inner]) + _LEAST_COUNT * self._area
+        agreeing /= self._over_band(counts[inner]) + _LEAST_COUNT * self._area + 1e-6
         if self._trust is None:
             self._trust = agreeing
         self._trust += _TRUST_PER_FRAME * (agreeing - self._trust)

@@ -16,8 +16,8 @@ _STEADY = 0.2
 """Share of the way to its new value that the flow goes at once where nothing moves."""
 _CHANGE_SIDE = 7
 _AGREE_PX = 2.0
-"""Flows that lead there and back again do so within that distance."""
-_RESIDUE_SHARE, _NOISE = 0.5, 5.0
+"""Flows that lead there and back again do so within so many columns."""
+_RESIDUE_SHARE, _NOISE = 0.5, 5
 """Of what the views differ by flow leaves no more than that share, and grey levels of noise."""
 _RESIDUE_SIDES = 5, 5
 
@@ -55,8 +55,8 @@ class OpticalFlow:
         self._views = _View(self, width, height), _View(self, width, height)
         self._weight = np.ones_like(self.grid)
         self._scratch = [np.empty_like(self.grid) for _ in range(2)]
-        self._distance = np.empty((self.height, self.width), np.float32)
-        self._near = np.empty((self.height, self.width), np.bool_)
+        self._across = np.empty((self.height, self.width), np.float32)
+        self._is = np.empty((self.height, self.width), np.bool_)
         self._even, self._followed = np.empty((2, self.height, self.width), np.uint8)
         self._is_first = True
 
@@ -87,23 +87,26 @@ class OpticalFlow:
         """Interpolate a field at positions (height, width, 2)."""
         cv2.remap(field, at, None, cv2.INTER_LINEAR, dst=out, borderMode=cv2.BORDER_REPLICATE)
 
-    def agrees(self, out: np.ndarray) -> None:
-        """Find where there and back leads to where it began, and the views show the same.
+    def judge(self, agrees: np.ndarray, counts: np.ndarray) -> None:
+        """Find where the flow is right, and where it matters.
 
         Parameters
         ----------
-        out
-            (height, width) uint8: 1 there, 0 elsewhere.
+        agrees
+            (height, width) uint8, overwritten: 1 where there and back leads to where it began, and
+            the views show the same; 0 elsewhere.
+        counts
+            The same: 1 there, and where the views differ if they are not warped.
         """
         at, back = self._scratch
-        out[:] = 1
+        agrees[:] = 1
         for there, again in (self.flows, self.flows[::-1]):
             np.add(self.grid, there, out=at)
             self.sample(again, at, back)
             back += there
-            back *= back
-            np.add(back[..., 0], back[..., 1], out=self._distance)
-            out &= np.less(self._distance, _AGREE_PX**2, out=self._near)
+            # Along an upright edge any height will do.
+            across = np.abs(cv2.extractChannel(back, 0, dst=self._across), out=self._across)
+            agrees &= np.less(across, _AGREE_PX, out=self._is)
         ours, theirs = (view.grey for view in self._views)
         # They need not be equally bright.
         scale = max(1.0, cv2.mean(ours)[0]) / max(1.0, cv2.mean(theirs)[0])
@@ -113,8 +116,11 @@ class OpticalFlow:
         for image, residue in ((self._followed, self._followed), (even, self._even)):
             cv2.absdiff(ours, image, dst=residue)
             cv2.blur(residue, _RESIDUE_SIDES, dst=residue)
+        np.greater(self._even, _NOISE, out=self._is)
+        np.copyto(counts, self._is)
         cv2.convertScaleAbs(self._even, dst=self._even, alpha=_RESIDUE_SHARE, beta=_NOISE)
-        out &= np.less(self._followed, self._even, out=self._near)
+        agrees &= np.less(self._followed, self._even, out=self._is)
+        counts |= agrees
 
     def reduced(self, image: np.ndarray) -> np.ndarray:
         """Reduce a picture as the views are; the border repeats its edge."""
