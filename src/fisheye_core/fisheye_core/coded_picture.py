@@ -1,9 +1,16 @@
 """Coded pictures: decoded only after their head said how large they will be."""
 
+from contextlib import suppress
+
 import cv2
 import numpy as np
 
+<<<<<<< HEAD:src/fisheye_core/fisheye_core/coded_picture.py
 from fisheye_core.errors import ImageFormatError
+=======
+from fisheye_geometry.errors import ImageFormatError
+from fisheye_geometry.quiet_jpeg import without_libjpeg_lines
+>>>>>>> a0d4612 (Keep libjpeg's own lines out of the logs):src/fisheye_geometry/fisheye_geometry/coded_picture.py
 
 _PNG = b'\x89PNG\r\n\x1a\n'
 _JPEG = b'\xff\xd8'
@@ -101,10 +108,10 @@ def pixels_of(coded: np.ndarray, *, grey: bool = False) -> np.ndarray:
     """
     _check_claim(coded)
     kind = cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR
-    try:
-        image = cv2.imdecode(coded, kind | cv2.IMREAD_IGNORE_ORIENTATION) if coded.size else None
-    except cv2.error:
-        image = None
+    image = None
+    if coded.size:
+        with without_libjpeg_lines(), suppress(cv2.error):
+            image = cv2.imdecode(coded, kind | cv2.IMREAD_IGNORE_ORIENTATION)
     if image is None:
         raise ImageFormatError(f'{coded.size} bytes are a broken picture')
     return image
