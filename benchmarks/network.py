@@ -51,7 +51,9 @@ def main() -> None:
     parser.add_argument('--rate', type=float, default=30.0, help='pictures a second')
     parser.add_argument('--kinds', nargs='*', default=list(KINDS), choices=list(KINDS))
     arguments = parser.parse_args()
-    print('| camera | consumer | panoramas a second | true age p50, p99, ms | true - told p50, ms |')
+    print(
+        '| camera | consumer | panoramas a second | true age p50, p99, ms | true - told p50, ms |'
+    )
     print('| --- | --- | --- | --- | --- |')
     for kind in arguments.kinds:
         for is_slow in (False, True):

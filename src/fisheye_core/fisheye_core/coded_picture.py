@@ -5,12 +5,8 @@ from contextlib import suppress
 import cv2
 import numpy as np
 
-<<<<<<< HEAD:src/fisheye_core/fisheye_core/coded_picture.py
 from fisheye_core.errors import ImageFormatError
-=======
-from fisheye_geometry.errors import ImageFormatError
-from fisheye_geometry.quiet_jpeg import without_libjpeg_lines
->>>>>>> a0d4612 (Keep libjpeg's own lines out of the logs):src/fisheye_geometry/fisheye_geometry/coded_picture.py
+from fisheye_core.quiet_jpeg import without_libjpeg_lines
 
 _PNG = b'\x89PNG\r\n\x1a\n'
 _JPEG = b'\xff\xd8'

@@ -7,8 +7,8 @@ import cv2
 import numpy as np
 import pytest
 
-from fisheye_geometry.coded_picture import decoded
-from fisheye_geometry.quiet_jpeg import without_libjpeg_lines
+from fisheye_core.coded_picture import decoded
+from fisheye_core.quiet_jpeg import without_libjpeg_lines
 
 PICTURE = np.random.default_rng(1).integers(0, 255, (48, 64, 3), np.uint8)
 CODED = cv2.imencode('.jpg', PICTURE)[1].ravel()
