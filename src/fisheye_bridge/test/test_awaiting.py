@@ -1,6 +1,7 @@
 """What a thread answers, or leaves undone, reaches the coroutine that waits for it."""
 
 import concurrent.futures
+from time import monotonic
 
 import pytest
 import rclpy
@@ -17,15 +18,17 @@ def answer():
     rclpy.init(context=context)
     executor = SingleThreadedExecutor(context=context)
 
-    def answer(future, end):
+    def answer(future, end, **options):
         async def wait():
-            return await awaitable(future)
+            return await awaitable(future, **options)
 
         task = executor.create_task(wait)
         executor.spin_once(timeout_sec=0)
         assert not task.done()
         end(future)
-        executor.spin_until_future_complete(task, timeout_sec=10)
+        deadline_s = monotonic() + 10.0
+        while not task.done() and monotonic() < deadline_s:
+            executor.spin_once(timeout_sec=0.05)
         assert task.done()
         return task.result()
 
@@ -53,3 +56,16 @@ def test_what_was_left_undone_is_an_error_too(answer):
 
     with pytest.raises(FisheyeError, match='it was not done: the node ends'):
         answer(concurrent.futures.Future(), cancel)
+
+
+def test_what_takes_too_long_is_an_error_and_goes_on(answer):
+    future = concurrent.futures.Future()
+    with pytest.raises(FisheyeError, match=r'it is not done after 0\.05 s on this busy'):
+        answer(future, lambda _: None, within_s=0.05)
+    future.set_result(7)
+    assert future.result() == 7
+
+
+def test_what_is_done_in_time_is_given(answer):
+    future = concurrent.futures.Future()
+    assert answer(future, lambda future: future.set_result(7), within_s=60.0) == 7

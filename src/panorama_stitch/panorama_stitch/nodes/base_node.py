@@ -2,9 +2,11 @@
 
 from collections import deque
 from threading import Thread
+from time import monotonic
 
 from fisheye_msgs.msg import Overlaps, Projection
 from fisheye_msgs.srv import CalibrateOverlap
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 from std_msgs.msg import Header
 
@@ -34,6 +36,8 @@ from panorama_stitch.pipeline.stitch_pipeline import Panorama, StitchPipeline
 
 FRAME_ID = 'panorama_optical_frame'
 _LATENCIES = 300
+_ANSWER_S = 10.0
+"""Nobody waits longer for the answer of a service; what was asked for is done nevertheless."""
 
 
 class PanoramaBase(Node):
@@ -51,7 +55,13 @@ class PanoramaBase(Node):
         self._image = ImagePublisher(self, 'panorama/image')
         self._projection = self.create_publisher(Projection, 'panorama/projection', LATCHED)
         self._overlaps = self.create_publisher(Overlaps, 'panorama/overlap', LATCHED)
-        self.create_service(CalibrateOverlap, 'calibrate_overlap', self._calibrate)
+        # A group of its own: while an answer is awaited, rclpy runs nothing else of its group.
+        self.create_service(
+            CalibrateOverlap,
+            'calibrate_overlap',
+            self._calibrate,
+            callback_group=MutuallyExclusiveCallbackGroup(),
+        )
         self._diagnostics = Diagnostics(self, self._report)
         self._thread = Thread(target=self._publish_panoramas, name='compose', daemon=True)
         self._thread.start()
@@ -77,11 +87,13 @@ class PanoramaBase(Node):
     def _publish_panoramas(self) -> None:
         """Publish each panorama that the pipeline has, until it is stopped."""
         while (panorama := self.pipeline.next()) is not None:
+            begin_s = monotonic()
             if panorama.compositor is not self._announced:
                 self._announce(panorama)
             self._handled += 1
             if self._image.wanted:
                 self._publish(panorama)
+            self.pipeline.leave_room(monotonic() - begin_s)
 
     def _publish(self, panorama: Panorama) -> None:
         surface = panorama.surface
@@ -111,7 +123,9 @@ class PanoramaBase(Node):
                     f"method is '{request.method}'; expected one of {', '.join(METHODS)}"
                 )
             # Frames keep coming meanwhile: a coroutine, not a thread, waits for the answer.
-            measured = await awaitable(self.pipeline.calibrate(request.method, request.save))
+            measured = await awaitable(
+                self.pipeline.calibrate(request.method, request.save), within_s=_ANSWER_S
+            )
             response.overlaps = overlap_messages(measured, self.pipeline.rig, FRAME_ID)
         except FisheyeError as error:
             response.success, response.message = False, str(error)

@@ -6,7 +6,7 @@ published. Nothing here calls back: whoever owns the pipeline asks it.
 """
 
 from collections.abc import Sequence
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
 from dataclasses import dataclass
 from threading import Lock
 from time import monotonic, monotonic_ns
@@ -30,6 +30,8 @@ from panorama_stitch.pipeline.stale import StaleCameras, write_age
 
 _WAITING = 2
 """Frame sets that may wait to be composed: a moment without the processor loses none."""
+_ROOM = 2.0
+"""What a measurement that was asked for gets, in units of what a panorama takes."""
 
 
 class _Frame(NamedTuple):
@@ -121,6 +123,7 @@ class StitchPipeline:
         self._waiting: LatestOnlyQueue[_FrameSet] = LatestOnlyQueue(_WAITING)
         self._lock = Lock()
         self._paired_s = monotonic()
+        self._asked: Future | None = None
         self._color = ''
         self._dimensions = 0
 
@@ -181,7 +184,19 @@ class StitchPipeline:
 
     def calibrate(self, method: str, save: bool) -> Future:
         """Measure the overlaps anew, off the frame path; as of `CompositorBuilder.calibrate`."""
-        return self._builder.calibrate(self.settings, method, save)
+        self._asked = self._builder.calibrate(self.settings, method, save)
+        return self._asked
+
+    def leave_room(self, took_s: float) -> None:
+        """Leave a measurement that was asked for its share of a busy machine.
+
+        Parameters
+        ----------
+        took_s
+            How long the last panorama took; composing would take all there is.
+        """
+        if self._asked and not self._asked.done():
+            wait([self._asked], _ROOM * took_s)
 
     def stop(self) -> None:
         """End `next` and the background work."""

@@ -1,0 +1,38 @@
+"""A stitch node that measures an overlap for somebody goes on with everything else."""
+
+import pytest
+from field import START_S
+from fisheye_msgs.srv import CalibrateOverlap
+from health import Health
+from rcl_interfaces.srv import GetParameters
+from rig import SIDES, wait_for
+
+LARGE = {'width': 1920, 'height': 1440}
+"""Pictures of this size keep a measurement busy for a while."""
+TRIES = 5
+
+
+@pytest.fixture
+def health(domain):
+    with Health(domain) as health:
+        yield health
+
+
+def test_parameters_are_answered_while_an_overlap_is_measured(rig, health):
+    for side in SIDES:
+        rig.start(f'{side}/capture', **LARGE)
+        rig.start(f'{side}/undistort')
+    rig.start('stitch')
+    wait_for(lambda: rig.check_alive() or health.seen, START_S, 'a panorama')
+    measure = health.node.create_client(CalibrateOverlap, 'calibrate_overlap')
+    ask = health.node.create_client(GetParameters, 'stitch/get_parameters')
+    wait_for(lambda: measure.service_is_ready() and ask.service_is_ready(), START_S, 'services')
+    meanwhile = 0
+    for _ in range(TRIES):
+        measured = measure.call_async(CalibrateOverlap.Request())
+        while not measured.done():
+            answered = ask.call_async(GetParameters.Request(names=['blend']))
+            wait_for(answered.done, START_S, 'an answer')
+            meanwhile += not measured.done()
+    print(f'\n{meanwhile} answers came during {TRIES} measurements')
+    assert meanwhile > TRIES, 'parameters wait for measurements'
