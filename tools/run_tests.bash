@@ -18,4 +18,10 @@ if [ $packages != 0 ]; then
   echo 'Tests of packages have failed:' >&2
   colcon test-result >&2
 fi
+packages_missing=
+command -v chromium > /dev/null && command -v chromedriver > /dev/null ||
+  packages_missing+=' chromium chromium-driver'
+command -v ip > /dev/null || packages_missing+=' iproute2'
+[ -z "$packages_missing" ] ||
+  echo "Not tested: what needs a browser or a network of its own. sudo apt install$packages_missing"
 [ $packages = 0 ] && [ $across = 0 ]
