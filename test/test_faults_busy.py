@@ -3,9 +3,10 @@
 import pytest
 from field import START_S
 from fisheye_msgs.srv import CalibrateOverlap
-from health import Health
 from rcl_interfaces.srv import GetParameters
-from rig import SIDES, wait_for
+
+from fisheye_testing.health import Health
+from fisheye_testing.rig import SIDES, wait_for
 
 LARGE = {'width': 1920, 'height': 1440}
 """Pictures of this size keep a measurement busy for a while."""
