@@ -6,7 +6,7 @@ PYTHON ?= python3
 run := source env.bash && exec
 packages := $(notdir $(wildcard src/*))
 # Folders count too: theirs is the time that changes when a file is removed. Tests run where they are.
-sources := $(shell find src config -name test -prune -o -print)
+sources := $(shell find src -name test -prune -o -print)
 
 help:
 	@sed -nE 's/^([a-z-]+):.*## /  make \1\t/p' Makefile | expand -t 24
@@ -49,7 +49,7 @@ clean: ## remove everything that the targets above made
 
 # What $? lists decides which packages are built again.
 changed = $(if $(filter .venv/.done src,$?),$(packages),$(sort \
-    $(filter $(packages),$(subst /, ,$?)) $(if $(filter config%,$?),panorama_stitch)))
+    $(filter $(packages),$(subst /, ,$?))))
 install/.built: .venv/.done $(sources)
 	@rm -rf $(changed:%=build/%) $(changed:%=install/%)
 	@source .venv/local_setup.bash && env -u PYTHONDONTWRITEBYTECODE \

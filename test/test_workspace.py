@@ -34,9 +34,41 @@ def test_packages_agree(tag):
 
 
 @pytest.mark.parametrize('setup', SETUPS, ids=lambda path: path.parent.name)
-def test_setup_has_the_version_of_the_manifest(setup):
-    manifest = ElementTree.parse(setup.with_name('package.xml'))
-    assert keywords(setup)['version'].value == manifest.findtext('version')
+def test_setup_says_what_the_manifest_says(setup):
+    manifest, told = ElementTree.parse(setup.with_name('package.xml')), keywords(setup)
+    for tag in ('version', 'maintainer', 'description', 'license'):
+        assert told[tag].value == manifest.findtext(tag)
+    assert told['maintainer_email'].value == manifest.find('maintainer').get('email')
+    assert (setup.parent / setup.parent.name / 'py.typed').exists()
+    assert 'py.typed' in ast.unparse(told['package_data'])
+
+
+@pytest.mark.parametrize('manifest', MANIFESTS, ids=lambda path: path.parent.name)
+def test_a_package_brings_its_license_and_changelog(manifest):
+    folder = manifest.parent
+    assert (folder / 'LICENSE').read_bytes() == (ROOT / 'LICENSE').read_bytes()
+    assert not (folder / 'LICENSE').is_symlink()
+    first, title, last = (folder / 'CHANGELOG.rst').read_text().splitlines()[:3]
+    assert title == f'Changelog for package {folder.name}'
+    assert first == last == '^' * len(title)
+
+
+def test_what_a_user_edits_is_what_the_packages_install():
+    links = sorted((ROOT / 'config').iterdir())
+    assert [link.name for link in links] == [
+        'calibration',
+        'fastdds.xml',
+        'fastdds_small.xml',
+        'panorama.yaml',
+    ]
+    for link in links:
+        assert not link.readlink().is_absolute()
+        package = link.resolve(strict=True).relative_to(ROOT / 'src').parts[0]
+        installed = ROOT / 'install' / package / 'share' / package / 'config' / link.name
+        pairs = [(link, installed)] if link.is_file() else []
+        pairs += [(file, installed / file.name) for file in link.glob('*')]
+        for ours, theirs in pairs:
+            assert ours.read_bytes() == theirs.read_bytes()
 
 
 @pytest.mark.parametrize('setup', SETUPS, ids=lambda path: path.parent.name)

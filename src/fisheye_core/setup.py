@@ -5,6 +5,10 @@ package_name = 'fisheye_core'
 setup(
     name=package_name,
     version='0.2.0',
+    maintainer='Fisheye Panorama maintainers',
+    maintainer_email='maintainers@fisheye-panorama.example',
+    description='Settings, files, errors and worker threads of the fisheye packages. No ROS.',
+    license='Apache-2.0',
     packages=[package_name],
     package_data={package_name: ['py.typed']},
     data_files=[

@@ -4,9 +4,13 @@ package_name = 'panorama_viewer'
 
 setup(
     name=package_name,
-    version='0.1.0',
+    version='0.2.0',
+    maintainer='Fisheye Panorama maintainers',
+    maintainer_email='maintainers@fisheye-panorama.example',
+    description='The live panorama in a browser, and saved to files that other programs read.',
+    license='Apache-2.0',
     packages=[package_name],
-    package_data={package_name: ['web/*']},
+    package_data={package_name: ['py.typed', 'web/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),

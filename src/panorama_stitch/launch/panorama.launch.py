@@ -22,6 +22,7 @@ from fisheye_core.yaml_file import read_mapping
 from launch import LaunchDescription, logging
 
 CONFIG = Path(get_package_share_directory('panorama_stitch')) / 'config'
+PROFILE = Path(get_package_share_directory('fisheye_bridge')) / 'config' / 'fastdds.xml'
 CAMERAS = ('left', 'right')
 ARGUMENTS = {
     'composed': ('false', 'one process from cameras to panorama instead of five nodes'),
@@ -237,9 +238,7 @@ def generate_launch_description():
                 DeclareLaunchArgument(name, default_value=value, description=text)
                 for name, (value, text) in ARGUMENTS.items()
             ),
-            SetEnvironmentVariable(
-                PROFILES, os.environ.get(PROFILES, str(CONFIG / 'fastdds.xml'))
-            ),
+            SetEnvironmentVariable(PROFILES, os.environ.get(PROFILES, str(PROFILE))),
             SetEnvironmentVariable(BOUND, '1'),
             OpaqueFunction(function=start),
         ]
