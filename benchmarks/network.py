@@ -16,16 +16,16 @@ from math import radians
 from pathlib import Path
 from threading import Event, Thread
 
-import network_camera
 import numpy as np
-from painted_time import BLOCKS, age_ms, centres_px, read
-from rig import SIDES, Rig, unused_domain, wait_for
-from watcher import Watcher
 
 from fisheye_bridge.images import to_array
 from fisheye_bridge.stamps import ns_of
 from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.camera_file import Camera, write_camera
+from fisheye_testing import network_camera
+from fisheye_testing.painted_time import BLOCKS, age_ms, centres_px, read
+from fisheye_testing.rig import SIDES, Rig, unused_domain, wait_for
+from fisheye_testing.watcher import Watcher
 
 SIZE = 640, 480
 FOV_DEG, OFFSET_PX = 170.0, 527.0

@@ -235,10 +235,14 @@ class HttpServer:
 
         self._arguments, self._relay = arguments, relay
         self._jpeg, self._came = b'', Condition()
-        server = ThreadingHTTPServer(
-            (HOST, arguments.port), partial(Handler, directory=folder or '/nowhere')
-        )
-        server.daemon_threads = True
+
+        class Server(ThreadingHTTPServer):
+            daemon_threads = True
+
+            def handle_error(self, request, client_address):
+                """Leave it unsaid that a reader went away in the middle."""
+
+        server = Server((HOST, arguments.port), partial(Handler, directory=folder or '/nowhere'))
         self.address = f'http://{HOST}:{server.server_port}'
         Thread(target=server.serve_forever, daemon=True).start()
         if not relay and not folder:
