@@ -105,6 +105,16 @@ class CameraSettings:
         maximum=180.0,
         nan=True,
     )
+    synthetic_pitch_deg: float = setting(
+        0.0, 'How far the synthetic camera looks up.', minimum=-90.0, maximum=90.0
+    )
+    synthetic_roll_deg: float = setting(
+        0.0,
+        'How far the synthetic camera is turned about its axis, clockwise as it sees it; 180: it '
+        'hangs upside down.',
+        minimum=-180.0,
+        maximum=180.0,
+    )
     synthetic_gain: float = setting(
         1.0, 'Exposure of the synthetic camera.', minimum=0.05, maximum=20.0
     )

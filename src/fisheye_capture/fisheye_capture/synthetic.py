@@ -6,9 +6,9 @@ from fisheye_capture.capture_settings import CaptureSettings
 from fisheye_capture.pace import PacedSource
 from fisheye_capture.scene import Scene
 from fisheye_core.encodings import from_opencv
+from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.camera_file import Camera
 from fisheye_geometry.lens import FisheyeLens
-from fisheye_geometry.remap import Turn
 
 _SIZE_PX = 640, 480
 _DISTORTION = (-0.02, 0.004, -0.001, 0.0001)
@@ -22,8 +22,13 @@ class SyntheticSource(PacedSource):
         width, height = settings.width or _SIZE_PX[0], settings.height or _SIZE_PX[1]
         lens = synthetic_lens(width, height, np.radians(settings.synthetic_fov_deg))
         self.camera = Camera(settings.camera_name, lens)
-        turn = Turn(np.radians(settings.synthetic_yaw_deg))
-        self._view = Scene().view(lens, turn, settings.synthetic_gain)
+        angles_deg = (
+            settings.synthetic_yaw_deg,
+            settings.synthetic_pitch_deg,
+            settings.synthetic_roll_deg,
+        )
+        attitude = Attitude(*np.radians(angles_deg))
+        self._view = Scene().view(lens, attitude, settings.synthetic_gain)
         self._encoding = settings.encoding
 
     def _picture(self, stamp_ns):

@@ -2,12 +2,15 @@
 
 import os
 
+import numpy as np
 import pytest
 
 from fisheye_capture import sources
+from fisheye_capture.scene import Scene
 from fisheye_capture.source import SourceLostError, shown_source
 from fisheye_capture.sources import open_source
 from fisheye_core.errors import SourceError
+from fisheye_geometry.attitude import Attitude
 
 
 def test_the_synthetic_camera_is_known_exactly(settings):
@@ -15,6 +18,17 @@ def test_the_synthetic_camera_is_known_exactly(settings):
     camera, frame = source.camera, source.read()
     assert camera.name == 'left'
     assert frame.image.shape == (camera.lens.height, camera.lens.width, 3) == (480, 640, 3)
+
+
+def test_the_synthetic_camera_can_be_mounted_in_any_way(settings):
+    angles_deg = (100.0, -12.0, 180.0)
+    names = ('synthetic_yaw_deg', 'synthetic_pitch_deg', 'synthetic_roll_deg')
+    angles = dict(zip(names, angles_deg, strict=True))
+    source = open_source(settings(width=160, height=120, **angles))
+    frame = source.read()
+    attitude = Attitude(*np.radians(angles_deg))
+    expected = Scene().view(source.camera.lens, attitude).frame(frame.stamp_ns)
+    assert (frame.image == expected).all()
 
 
 def test_cameras_of_one_rate_share_a_grid_of_times(settings, write_picture):
