@@ -4,6 +4,8 @@ import gc
 import threading
 import time
 from dataclasses import replace
+from functools import partial
+from unittest.mock import Mock
 
 import cv2
 import numpy as np
@@ -14,7 +16,7 @@ from fisheye_capture.synthetic import synthetic_lens
 from fisheye_core.errors import CameraFileError, ImageFormatError, OverlapError
 from fisheye_geometry.remap import RemapTable, Turn
 from panorama_stitch.compose.compositor import Compositor
-from panorama_stitch.pipeline.metrics import unpaired_sentence
+from panorama_stitch.pipeline.metrics import economy_sentence, metrics, unpaired_sentence
 from panorama_stitch.pipeline.panorama_settings import PanoramaSettings
 from panorama_stitch.pipeline.stitch_pipeline import StitchPipeline
 
@@ -37,7 +39,7 @@ class Line:
     """A pipeline, what it made, and a hand that feeds it."""
 
     def __init__(self, settings=SETTINGS):
-        self.published, self.warnings = [], []
+        self.published, self.warnings, self.economical = [], [], []
         self.news, self.may_draw = threading.Event(), threading.Event()
         self.may_draw.set()
         self.pipeline = StitchPipeline(settings)
@@ -58,6 +60,7 @@ class Line:
             out = np.empty((surface.height, surface.width, *image.shape[2:]), np.uint8)
             panorama.draw(out)
             self.published.append((panorama.stamp_ns, out, panorama.stale))
+            self.economical.append(panorama.is_economical)
 
     def feed(self, pictures, until, what):
         """Feed frames of these cameras until a condition holds."""
@@ -128,6 +131,20 @@ def test_a_camera_that_never_came_is_black_and_then_measured(make_line, pictures
         pictures, lambda: line.pipeline.rig.overlaps and not line.published[-1][2], 'both sides'
     )
     assert overlap_in_use(line).found
+
+
+def test_without_time_flow_is_left_out_and_that_is_told(make_line, pictures):
+    line = make_line(replace(SETTINGS, blend='flow'))
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    pipeline = line.pipeline
+    for is_on, name in ((False, 'off'), (True, 'on')):
+        pipeline.economy = Mock(is_on=is_on, **{'started.return_value': is_on})
+        line.economical.clear()
+        line.feed(pictures, partial(line.economical.__contains__, is_on), f'economy {name}')
+        assert metrics(pipeline)['economy'] == name
+        assert ('no time for blend:=flow' in economy_sentence(pipeline)) == is_on
+        assert pipeline.economy.arrived.called
+        assert pipeline.economy.ended.called
 
 
 def test_with_both_silent_nothing_is_published(make_line, pictures):

@@ -37,6 +37,8 @@ class Compositor:
         What it was made from.
     views
         Of the cameras in the rig's order.
+    is_costly
+        Whether economy leaves anything out.
     """
 
     def __init__(
@@ -64,6 +66,7 @@ class Compositor:
             Fade(layout, seam, pair, _BLENDS[blend])
             for seam, pair in zip(layout.seams, neighbours(placed), strict=True)
         ]
+        self.is_costly = any(fade.is_costly for fade in self._fades)
         count = min(cv2.getNumberOfCPUs(), _MOST_SLABS)
         edges = np.linspace(0, layout.surface.height, count + 1)
         slabs = [slice(*rows) for rows in pairwise(edges.round().astype(int))]

@@ -59,6 +59,11 @@ class Fade:
         """Whether some rows can be blended while others are not drawn yet."""
         return self._blend is not None and self._blend.is_local
 
+    @property
+    def is_costly(self) -> bool:
+        """Whether economy leaves anything out."""
+        return self._blend is not None and self._blend.needs_overlap
+
     def blend(self, rows: slice, out: np.ndarray, *, economical: bool = False) -> None:
         """Blend some rows of the views, without what takes long if `economical`."""
         if not self._blend:

@@ -30,7 +30,12 @@ from fisheye_core.rate_meter import RateMeter
 from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.nodes.overlap_message import overlap_messages
 from panorama_stitch.overlap.overlap_settings import METHODS
-from panorama_stitch.pipeline.metrics import latency_metrics, metrics, unpaired_sentence
+from panorama_stitch.pipeline.metrics import (
+    economy_sentence,
+    latency_metrics,
+    metrics,
+    unpaired_sentence,
+)
 from panorama_stitch.pipeline.panorama_settings import PanoramaOutputSettings
 from panorama_stitch.pipeline.stitch_pipeline import Panorama, StitchPipeline
 
@@ -147,6 +152,8 @@ class PanoramaBase(Node):
             report.add(WARN, pipeline.trouble)
         if not all(result.found for result in pipeline.overlaps):
             report.add(WARN, 'no overlap: frames are side by side')
+        if sentence := economy_sentence(pipeline):
+            report.add(WARN, sentence)
         if pipeline.unpaired_s > self.settings.stale_after_s:
             report.add(ERROR, unpaired_sentence(pipeline))
         ages_s = pipeline.ages_s()

@@ -19,6 +19,8 @@ def metrics(pipeline: StitchPipeline) -> dict[str, float | str]:
         'pairs overtaken': pipeline.overtaken,
         'pairs broken': pipeline.broken,
     }
+    if pipeline.compositor and pipeline.compositor.is_costly:
+        values['economy'] = 'on' if pipeline.economy.is_on else 'off'
     for camera in cameras:
         values[f'{camera} rate Hz'] = pipeline.rates[camera].hz
         values[f'{camera} unpaired'] = pipeline.pairing.unpaired[camera]
@@ -54,6 +56,17 @@ def latency_metrics(latencies_ms: Sequence[float]) -> dict[str, float | str]:
         }
     apart = f'{abs(usual_ms) / 1e3:.3g} s {"ahead of" if usual_ms < 0 else "behind"}'
     return {'latency': f"not known: the stamps are {apart} this machine's clock"}
+
+
+def economy_sentence(pipeline: StitchPipeline) -> str:
+    """Return the sentence that something is left out for want of time; '' if nothing is."""
+    compositor = pipeline.compositor
+    if compositor is None or not compositor.is_costly or not pipeline.economy.is_on:
+        return ''
+    return (
+        f'no time for blend:={pipeline.settings.blend} at this rate: seams only fade until there '
+        'is (fewer or smaller pictures, or blend:=feather)'
+    )
 
 
 def unpaired_sentence(pipeline: StitchPipeline) -> str:

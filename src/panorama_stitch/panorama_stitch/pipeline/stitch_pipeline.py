@@ -23,6 +23,7 @@ from fisheye_geometry.surface import Surface
 from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.overlap.overlap_result import Overlap
 from panorama_stitch.pipeline.compositor_builder import CompositorBuilder
+from panorama_stitch.pipeline.economy import Economy
 from panorama_stitch.pipeline.pairing import FramePairing
 from panorama_stitch.pipeline.panorama_settings import PanoramaOutputSettings
 from panorama_stitch.pipeline.rig_state import RigState
@@ -65,6 +66,8 @@ class Panorama:
         Of the images and of the panorama.
     stale
         For each camera that is not live the columns [begin, end) that show it, and its age, s.
+    is_economical
+        Whether there is no time for all that blends can do.
     """
 
     compositor: Compositor
@@ -72,6 +75,7 @@ class Panorama:
     stamp_ns: int
     encoding: str
     stale: dict[str, tuple[tuple[int, int], float]]
+    is_economical: bool = False
 
     @property
     def surface(self) -> Surface:
@@ -86,7 +90,9 @@ class Panorama:
         ImageFormatError
             If an image is not of the size that its camera is known to give.
         """
-        self.compositor.compose(self.images, out, are_live=not self.stale)
+        self.compositor.compose(
+            self.images, out, are_live=not self.stale, economical=self.is_economical
+        )
         for camera, (columns, age_s) in self.stale.items():
             write_age(out, columns, camera, age_s)
 
@@ -109,6 +115,8 @@ class StitchPipeline:
         At which each camera's frames come.
     broken : int
         Frame sets that could not be composed.
+    economy : Economy
+        Whether there is time for all that blends can do.
     """
 
     def __init__(self, settings: PanoramaOutputSettings):
@@ -118,6 +126,7 @@ class StitchPipeline:
         self.pairing = FramePairing(settings.cameras, round(settings.max_pair_skew_s * 1e9))
         self.rates = {camera: RateMeter() for camera in settings.cameras}
         self.broken = 0
+        self.economy = Economy()
         self._builder = CompositorBuilder(self.rig)
         self._stale = StaleCameras(settings.cameras)
         self._waiting: LatestOnlyQueue[_FrameSet] = LatestOnlyQueue(_WAITING)
@@ -148,9 +157,11 @@ class StitchPipeline:
             if paired := paired or self._beside_stale(camera, stamp_ns):
                 self._paired_s = monotonic()
                 self._waiting.put(paired)
+                self.economy.arrived()
 
     def next(self) -> Panorama | None:
         """Wait for frames that can be composed; return None when stopped."""
+        self.economy.ended()
         while (frames := self._waiting.get()) is not None:
             try:
                 if panorama := self._panorama(frames):
@@ -286,4 +297,5 @@ class StitchPipeline:
             for camera, age_s in frames.ages_s.items()
         }
         encoding = 'mono8' if images[0].ndim == 2 else self._color
-        return Panorama(compositor, images, frames.stamp_ns, encoding, stale)
+        is_economical = self.economy.started()
+        return Panorama(compositor, images, frames.stamp_ns, encoding, stale, is_economical)
