@@ -1,4 +1,6 @@
-"""Panoramas of the rigs in the field, drawn from their true attitudes, checked and written.
+"""Panoramas of the rigs in the field, checked and written.
+
+They are drawn from their true rotations, or from those that their pictures tell.
 
 At each seam both neighbours are drawn alone, and the displacement of the one against the other is
 measured by optical flow where there is texture: the median, and what nine tenths stay below, in
@@ -17,23 +19,31 @@ from pathlib import Path
 import cv2
 import numpy as np
 from pairs import DATA
+from scipy.spatial.transform import Rotation
 
 from fisheye_core.errors import FisheyeError
+from fisheye_geometry.attitude import angle_between
 from fisheye_geometry.camera_file import read_camera
 from fisheye_geometry.image_circle import ImageCircle
 from fisheye_geometry.level import DOWN
+from fisheye_geometry.rig import Rig, pairs_of
 from fisheye_geometry.rig_solution import solve_rig
 from fisheye_geometry.surface import SURFACES, surface_for
 from panorama_stitch.compose.build import Style, build_compositor
 from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.compose.layout import covered
-from panorama_stitch.compose.placing import place
+from panorama_stitch.compose.placing import leads_around, place
 from panorama_stitch.compose.posing import views_of_rig
+from panorama_stitch.overlap.measure import measure_rotation
+from panorama_stitch.overlap.view import View as OverlapView
 
 AROUND_SEAM_DEG = 8.0
 TEXTURE = 12.0
 """Gradient, grey levels a pixel, from which on flow can be believed."""
-SEAM_LIMIT_DEG, HORIZON_LIMIT_DEG = 0.5, 1.0
+ATTITUDE_LIMIT_DEG, SEAM_LIMIT_DEG, HORIZON_LIMIT_DEG = 0.5, 0.5, 1.0
+MIN_CONFIDENCE = 0.5
+WAY_BACK_DEG = 10.0
+"""How far the last camera and the first may be from what the others make of them."""
 SYMMETRIC = ('tilt_down_5', 'tilt_down_12', 'mixed_lenses', 'ring_3', 'six_conventional')
 """Rigs whose cameras pitch and roll alike."""
 NEAR = ('post', 'mast', 'body')
@@ -56,6 +66,7 @@ class Checked:
     """What is right with a panorama; degrees."""
 
     name: str
+    attitude_deg: float
     width_deg: float
     seam_deg: float
     seam_worst_deg: float
@@ -66,6 +77,7 @@ class Checked:
     def faults(self) -> list[str]:
         """What misses its limit."""
         checks = {
+            f'attitude {self.attitude_deg:.2f} deg': self.attitude_deg > ATTITUDE_LIMIT_DEG,
             f'seam {self.seam_deg:.2f} deg': self.seam_deg > SEAM_LIMIT_DEG
             and not self.name.startswith(NEAR),
             f'horizon {self.horizon_deg:.2f} deg': self.name in SYMMETRIC
@@ -81,13 +93,14 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('--out', type=Path, default=Path('out/panoramas'), help='for pictures')
     parser.add_argument('--surface', choices=SURFACES[:2], default=SURFACES[0])
+    parser.add_argument('--measured', action='store_true', help='from pictures, not from truth')
     parser.add_argument('names', nargs='*', help='rigs; all by default')
     options = parser.parse_args()
     folders = sorted(path.parent for path in (DATA / 'field').glob('*/truth.json'))
     if not folders:
         sys.exit('No rigs are there; set FISHEYE_DATA to the folder that holds field/.')
     options.out.mkdir(parents=True, exist_ok=True)
-    print('rig                 width   seam  worst  horizon  black   faults')
+    print('rig                attitude   width   seam  worst  horizon  black   faults')
     results = []
     for folder in folders:
         if options.names and folder.name not in options.names:
@@ -95,8 +108,8 @@ def main() -> int:
         checked = check(read_rig(folder), options)
         results.append(checked)
         print(
-            f'{checked.name:17s} {checked.width_deg:7.2f} {checked.seam_deg:6.2f} '
-            f'{checked.seam_worst_deg:6.2f} {checked.horizon_deg:8.2f} '
+            f'{checked.name:17s} {checked.attitude_deg:9.2f} {checked.width_deg:7.2f} '
+            f'{checked.seam_deg:6.2f} {checked.seam_worst_deg:6.2f} {checked.horizon_deg:8.2f} '
             f'{checked.black_percent:6.3f}   {", ".join(checked.faults) or "-"}',
             flush=True,
         )
@@ -117,16 +130,49 @@ def read_rig(folder: Path) -> FieldRig:
     return FieldRig(folder.name, images, lenses, attitudes, truth['closed'])
 
 
-def check(rig: FieldRig, options) -> Checked:
-    """Draw a rig's panorama, write it, and measure it."""
+def solve_true(rig: FieldRig) -> Rig:
+    """Solve a rig from its true rotations; what level is has to follow from them."""
     relative = [left.T @ right for left, right in pairwise(rig.attitudes)]
     closing = rig.attitudes[-1].T @ rig.attitudes[0] if rig.is_closed else None
-    cameras = list(zip(map(str, range(len(rig.lenses))), rig.lenses, strict=True))
-    solved = solve_rig(cameras, relative, closing=closing).rig
-    level = [camera.attitude.matrix for camera in solved.cameras]
+    return solve_rig(named(rig), relative, closing=closing).rig
+
+
+def solve_measured(rig: FieldRig, surfaces) -> Rig:
+    """Solve a rig from its pictures alone: neighbours, then the way back if it leads around."""
+    views = [OverlapView(*each) for each in zip(rig.images, rig.lenses, strict=True)]
+    rotations = [measured(left, right) for left, right in pairwise(views)]
+    solved = solve_rig(named(rig), rotations).rig
+    if not leads_around(views_of_rig(solved, surfaces)):
+        return solved
+    last, first = (solved.cameras[index].attitude.matrix for index in (-1, 0))
+    closing = measured(views[-1], views[0], Rotation.from_matrix(last.T @ first))
+    return solve_rig(named(rig), rotations, closing=closing).rig
+
+
+def measured(left: OverlapView, right: OverlapView, expected: Rotation | None = None):
+    """Return the rotation between two cameras, (3, 3), or None."""
+    within_rad = np.pi if expected is None else np.radians(WAY_BACK_DEG)
+    result = measure_rotation([(left, right)], expected=expected, within_rad=within_rad)
+    is_found = result is not None and result.confidence >= MIN_CONFIDENCE
+    return result.rotation.as_matrix() if is_found else None
+
+
+def named(rig: FieldRig) -> list:
+    """Return pairs of a name and a lens."""
+    return [(f'camera {index}', lens) for index, lens in enumerate(rig.lenses)]
+
+
+def check(rig: FieldRig, options) -> Checked:
+    """Draw a rig's panorama, write it, and measure it."""
     surfaces = [surface_for(lens, options.surface) for lens in rig.lenses]
     surfaces = [surface.with_focal(surfaces[0].focal_px) for surface in surfaces]
+    solved = solve_measured(rig, surfaces) if options.measured else solve_true(rig)
+    level = [camera.attitude.matrix for camera in solved.cameras]
     views, wraps = views_of_rig(solved, surfaces), solved.is_closed
+    turned = [
+        angle_between(level[left].T @ level[right], rig.attitudes[left].T @ rig.attitudes[right])
+        for left, right in pairs_of(len(level))
+    ]
     compositor = build_compositor(views, rig.images, Style(), wraps=wraps)
     surface = compositor.layout.surface
     out = np.empty((surface.height, surface.width, 3), np.uint8)
@@ -138,17 +184,13 @@ def check(rig: FieldRig, options) -> Checked:
     true_down, down = (a.T @ DOWN for a in (rig.attitudes[0], level[0]))
     return Checked(
         rig.name,
+        degrees(max(turned)),
         degrees(surface.width / surface.focal_px),
         max(median for median, _ in at_seams),
         max(most for _, most in at_seams),
         degrees(np.arccos(np.clip(true_down @ down, -1, 1))),
         100 * float((~shown).mean()),
     )
-
-
-def found_pairs(compositor: Compositor) -> int:
-    """How many seams a panorama has."""
-    return len(compositor.layout.seams)
 
 
 def displacement_deg(compositor: Compositor, images, index: int) -> tuple[float, float]:

@@ -1,6 +1,6 @@
 """Levelling: which way is down for a rig whose cameras are only known against each other."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import atan2, isnan, nan, pi
@@ -136,23 +136,28 @@ def _down(attitudes: list[np.ndarray], mounts: Sequence[Mount], is_closed: bool)
     ]
     if told:
         return np.sum(told, axis=0)
+    axes = [attitude[:, 2] for attitude in attitudes]
     if not is_closed and len(attitudes) > 2:
         attitudes, mounts = [attitudes[0], attitudes[-1]], [mounts[0], mounts[-1]]
-    choices = [
-        _QUARTERS_RAD if isnan(mount.roll_rad) else (mount.roll_rad,)
-        for mount in (mounts[0], mounts[-1])
-    ]
-    if len(attitudes) != 2:
-        # In a ring and alone nobody is turned unless it is said.
-        choices = [(0.0 if isnan(m.roll_rad) else m.roll_rad,) for m in mounts]
     best, best_tilt = attitudes[0] @ DOWN, np.inf
-    for rolls in product(*choices):
+    for rolls in _rolls(mounts):
         upright = [a @ Attitude(roll_rad=-r).matrix for a, r in zip(attitudes, rolls, strict=True)]
         down, tilt = _alike(upright)
-        tilt += _TILT_FOR_QUARTER_RAD if any(rolls) and len(choices[0]) > 1 else 0.0
-        if tilt < best_tilt:
+        is_guess = any(roll and isnan(m.roll_rad) for roll, m in zip(rolls, mounts, strict=True))
+        tilt += _TILT_FOR_QUARTER_RAD if is_guess else 0.0
+        if tilt < best_tilt and not _goes_left(axes, down):
             best, best_tilt = down, tilt
     return best
+
+
+def _rolls(mounts: Sequence[Mount]) -> Iterable[tuple[float, ...]]:
+    """How the cameras may be turned about their axes: as it is known, else upright first."""
+    if len(mounts) == 2:
+        return product(*(_QUARTERS_RAD if isnan(m.roll_rad) else (m.roll_rad,) for m in mounts))
+    return [
+        tuple(roll if isnan(mount.roll_rad) else mount.roll_rad for mount in mounts)
+        for roll in (0.0, pi)
+    ]
 
 
 def _alike(attitudes: list[np.ndarray]) -> tuple[np.ndarray, float]:
@@ -163,10 +168,12 @@ def _alike(attitudes: list[np.ndarray]) -> tuple[np.ndarray, float]:
     down = np.linalg.svd(mean)[2][0]
     if down @ mean.T @ DOWN < 0:
         down = -down
-    if len(attitudes) == 2:
-        upright = _upright(down)
-        left, right = (Attitude.of(upright @ attitude).yaw_rad for attitude in attitudes)
-        if _SURELY_LEFT_RAD < (right - left + pi) % (2 * pi) - pi < 0:
-            return down, np.inf
     seen = float(np.linalg.norm(np.cross(mean @ down, DOWN)))
     return down, atan2(seen, float(mean @ down @ DOWN))
+
+
+def _goes_left(axes: list[np.ndarray], down: np.ndarray) -> bool:
+    """Whether optical axes (3,) would follow each other to the left, were `down` down."""
+    level = np.array(axes) @ _upright(down).T
+    steps = np.diff(np.arctan2(level[:, 0], level[:, 2]))
+    return bool(((steps - _SURELY_LEFT_RAD) % (2 * pi) + _SURELY_LEFT_RAD).sum() < 0)

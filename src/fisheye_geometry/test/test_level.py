@@ -39,6 +39,8 @@ def seen_from_the_first(attitudes):
         rig((-91, 2, 0), (91, 2, 0)),
         rig((-95, -2, 0), (0, 5, 0), (95, -2, 0)),
         rig((-20, -8, 0), (20, -8, 0)),
+        rig((-120, -3, 0), (0, -3, 0), (120, -3, 0)),
+        rig((-120, -3, 180), (0, -3, 180), (120, -3, 180)),
     ],
 )
 def test_cameras_that_pitch_and_roll_alike_are_levelled_without_being_told(truth):
@@ -48,6 +50,14 @@ def test_cameras_that_pitch_and_roll_alike_are_levelled_without_being_told(truth
 def test_mounts_that_differ_share_the_difference():
     truth = rig((-70, -20, 0), (70, -18, 0))
     assert error_deg(levelled(seen_from_the_first(truth)), truth) < NEARLY_DEG
+
+
+@pytest.mark.parametrize('roll_deg', [0, 180])
+def test_a_ring_may_hang_upside_down(roll_deg):
+    truth = rig(*((yaw, -5, roll_deg) for yaw in (-135, -45, 45, 135)))
+    for is_closed in (False, True):
+        found = levelled(seen_from_the_first(truth), is_closed=is_closed)
+        assert error_deg(found, truth) < EXACT_DEG
 
 
 def test_all_cameras_of_a_ring_vote():
