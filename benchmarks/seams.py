@@ -14,6 +14,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from moving_least_squares import MovingLeastSquares
 from rooms import CHROMA, CROSSINGS, FOCAL_PX, OVERLAP_DEG, Scene, Shot
 from similarity import similarity_map
 
@@ -27,7 +28,8 @@ _GHOST = 0.25, 0.75
 """Between these shares of who crosses and of the room a pixel shows a ghost."""
 _AROUND_PX = 9
 """Pixels that who crosses may blur into are not still."""
-BLENDS = 'none', 'feather', 'multiband', 'flow'
+WAYS = 'none', 'feather', 'multiband', 'flow', 'mls', 'mls each'
+"""The blends, and to compare with, moving least squares found once and for each frame."""
 _FAR_M, _CLOSE_M = 2.0, 0.15
 """What flow must gain it must gain from there on, with lenses no farther apart."""
 _GAIN_DB, _SEAM_GAIN_DB, _SHOWN, _WOBBLE = 2.0, 3.0, (0.85, 1.15), 1.1
@@ -73,12 +75,12 @@ def judge_seams(out: Path) -> int:
     print(SeamQuality.HEADER)
     results = []
     for scene in scenes():
-        for quality in judged(scene, scene.shots(), BLENDS):
+        for quality in judged(scene, scene.shots(), WAYS):
             results.append(quality)
             print(quality, flush=True)
     (out / 'seams.json').write_text(json.dumps([asdict(each) for each in results], indent=1))
-    by_scene = zip(*(iter(results),) * len(BLENDS), strict=True)
-    misses = [miss for four in by_scene for miss in missed(four[1], four[3])]
+    by_scene = zip(*(iter(results),) * len(WAYS), strict=True)
+    misses = [miss for each in by_scene for miss in missed(each[1], each[3])]
     print('\n'.join(misses) or 'met: all that is asked of flow beside feather')
     return bool(misses)
 
@@ -122,8 +124,8 @@ class Strip:
     """An overlap, of which a blend is given the columns that it needs."""
 
     def __init__(self, blend: str, height: int, width: int, focal_px: float):
-        needed = {'none': 0, 'feather': FADE_DEG, 'multiband': MULTIBAND_DEG, 'flow': OVERLAP_DEG}
-        count = min(width, round(np.radians(needed[blend]) * focal_px))
+        needed = {'none': 0, 'feather': FADE_DEG, 'multiband': MULTIBAND_DEG}
+        count = min(width, round(np.radians(needed.get(blend, OVERLAP_DEG)) * focal_px))
         begin = (width - count) // 2 if count else 0
         self._columns = slice(begin, begin + count)
         seen = np.ones((height, count), bool)
@@ -134,6 +136,8 @@ class Strip:
             'feather': lambda: Feather(seen, seen),
             'multiband': lambda: Multiband(seen, seen),
             'flow': lambda: Flow(seen, seen, fade),
+            'mls': lambda: MovingLeastSquares(seen, seen, fade),
+            'mls each': lambda: MovingLeastSquares(seen, seen, fade, each_frame=True),
         }[blend]()
 
     def __call__(self, left: np.ndarray, right: np.ndarray) -> np.ndarray:
