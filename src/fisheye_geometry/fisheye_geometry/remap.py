@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from copy import copy
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import cv2
@@ -25,6 +25,8 @@ _OUTSIDE_PX = -100
 """Far enough from the picture that no interpolation reaches it."""
 _BAND_PX = 20_000
 """Rows are drawn in bands of about so many pixels of the picture, which stay in the cache."""
+_STRIDE = 4
+"""Columns from one that tells what a band needs to the next."""
 
 
 class _Band(NamedTuple):
@@ -92,8 +94,6 @@ class RemapTable:
         self.valid = np.empty(shape, bool)
         self._pixels = np.empty((*shape, 2), np.int16)
         self._fractions = None if interpolation == 'nearest' else np.empty(shape, np.uint16)
-        self._bands = []
-        needed = range(0), range(0)
         for rows in self._band_rows():
             where, self.valid[rows] = _source_pixels(source, surface, attitude, rows)
             pixels, fractions = cv2.convertMaps(
@@ -102,22 +102,18 @@ class RemapTable:
             self._pixels[rows] = pixels
             if self._fractions is not None:
                 self._fractions[rows] = fractions
-            needed = self._add_band(rows, needed)
         self.valid.setflags(write=False)
 
     def part(self, rows: slice, columns: slice) -> 'RemapTable':
         """Return the table of a part of the surface; it shares no memory with this one."""
         part = copy(self)
+        part.__dict__.pop('_bands', None)
         top, left = rows.start, columns.start
         part.surface = self.surface.window(left, top, columns.stop - left, rows.stop - top)
         part.valid = self.valid[rows, columns].copy()
         part._pixels = self._pixels[rows, columns].copy()
         if self._fractions is not None:
             part._fractions = self._fractions[rows, columns].copy()
-        part._bands = []
-        needed = range(0), range(0)
-        for band in part._band_rows():
-            needed = part._add_band(band, needed)
         part.valid.setflags(write=False)
         return part
 
@@ -126,11 +122,15 @@ class RemapTable:
         for top in range(0, self.surface.height, step):
             yield slice(top, min(top + step, self.surface.height))
 
-    def _add_band(self, rows: slice, above: tuple[range, range]) -> tuple[range, range]:
-        """Note a band whose maps are there; return the rows and columns that it needs."""
-        needed = _needed(self._pixels[rows][self.valid[rows]])
-        self._bands.append(_Band(rows, _fresh(needed, above)))
-        return needed
+    @cached_property
+    def _bands(self) -> list[_Band]:
+        bands, above = [], (range(0), range(0))
+        for rows in self._band_rows():
+            part = rows, slice(None, None, _STRIDE)
+            needed = _needed(self._pixels[part][self.valid[part]])
+            bands.append(_Band(rows, _fresh(needed, above)))
+            above = needed
+        return bands
 
     def __call__(self, image: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
         """Correct a picture.
