@@ -49,6 +49,8 @@ RIGS = {
     'eight': ([(yaw, -5, 0) for yaw in range(-160, 180, 45)], SMALL, True),
     'a mirror': ([(0, 0, 0)], MIRROR, True),
     'a leaning mirror': ([(30, 4, -3)], MIRROR, True),
+    'looking straight up': ([(20, 90, 0)], WIDE, True),
+    'looking straight down': ([(0, -90, 0)], WIDE, True),
     'three wide': ([(-95, -2, 0), (0, -2, 0), (95, -2, 0)], FISHEYE, False),
 }
 

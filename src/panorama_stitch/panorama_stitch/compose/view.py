@@ -14,6 +14,8 @@ from fisheye_geometry.surface import Surface
 
 Cut = Callable[[np.ndarray, np.ndarray], object]
 """Draws a part of a panorama: takes the camera's picture and the array to draw into."""
+_STEEP_RAD = np.radians(60)
+"""A camera that looks up or down by more has no sides."""
 _SAME_FOCAL_PX = 1e-6
 
 
@@ -90,9 +92,12 @@ class View:
         """Return how far the wanted picture reaches to the left, right, up and down, rad.
 
         The sides are those of the panorama: what a camera that lies on its side has to its left
-        is up or down. To the sides it is wanted as far as it sees.
+        is up or down. To the sides it is wanted as far as it sees, and so is what a camera that
+        looks straight up or down has around it.
         """
         left, right, up, down = self.own_field_rad()
+        if abs(self.attitude.pitch_rad) > _STEEP_RAD:
+            left = right = pi
         turned = {
             0: (left, right, up, down),
             1: (pi, pi, left, right),
