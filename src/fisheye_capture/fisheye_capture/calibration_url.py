@@ -7,7 +7,7 @@ from urllib.parse import unquote
 
 from ament_index_python.packages import get_package_share_directory
 
-from fisheye_core.errors import CameraFileError
+from fisheye_core.errors import SettingError
 from fisheye_geometry.camera_file import Camera, read_camera
 
 _VARIABLE = re.compile(r'\$\{([^}]*)\}?')
@@ -18,8 +18,10 @@ def calibration_of(url: str, name: str) -> Camera | None:
 
     Raises
     ------
-    CameraFileError
-        If the URL means nothing, or its file describes no camera.
+    SettingError
+        If the URL means nothing.
+    FileAccessError, CameraFileError
+        If its file cannot be read, or describes no camera.
     """
     path = calibration_path(url, name)
     return None if path is None else read_camera(path)
@@ -37,34 +39,34 @@ def calibration_path(url: str, name: str) -> Path | None:
 
     Raises
     ------
-    CameraFileError
+    SettingError
         For another scheme or variable, for a package that is not installed and for a user who is
         not known.
     """
     if not url:
         return None
     if '\0' in unquote(url):
-        raise CameraFileError(f'camera_info_url {url!r} has a zero byte; expected a path or URL')
+        raise SettingError(f'camera_info_url {url!r} has a zero byte; expected a path or URL')
     scheme, mark, rest = url.partition('://')
     try:
         if not mark:
             return Path(_filled_in(url, name)).expanduser()
         rest = _filled_in(unquote(rest), name)
     except RuntimeError as error:
-        raise CameraFileError(
+        raise SettingError(
             f"camera_info_url '{url}' names the home of a user who is not known"
         ) from error
     if scheme == 'file':
         return Path(rest)
     if scheme != 'package':
-        raise CameraFileError(
+        raise SettingError(
             f"camera_info_url '{url}' has the scheme '{scheme}'; expected a path, file:// or package://"
         )
     package, _, path = rest.partition('/')
     try:
         return Path(get_package_share_directory(package), path)
     except (LookupError, ValueError, OSError) as error:
-        raise CameraFileError(
+        raise SettingError(
             f"camera_info_url '{url}' names the package '{package}', which is not installed"
         ) from error
 
@@ -75,7 +77,7 @@ def _filled_in(text: str, name: str) -> str:
             return name
         if found[0] == '${ROS_HOME}':
             return os.environ.get('ROS_HOME') or str(Path.home() / '.ros')
-        raise CameraFileError(
+        raise SettingError(
             f'camera_info_url has {found[0]}; expected ${{ROS_HOME}}, ${{NAME}} or none'
         )
 

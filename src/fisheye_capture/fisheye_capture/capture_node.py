@@ -16,7 +16,7 @@ from fisheye_capture.calibration_url import calibration_path
 from fisheye_capture.capture_settings import CaptureSettings
 from fisheye_capture.grabber import Grabber
 from fisheye_capture.source import Frame, JpegFrame, shown_source
-from fisheye_core.errors import CameraFileError, FisheyeError
+from fisheye_core.errors import CalibrationError, FisheyeError, SettingError
 from fisheye_core.latest_only import LatestOnlyWorker
 from fisheye_core.yaml_file import is_missing
 from fisheye_geometry.camera_file import Camera, read_camera, write_camera
@@ -94,10 +94,10 @@ class CaptureNode(Node):
         """Write the calibration file and use it from the next picture on."""
         try:
             if self._calibration_path is None:
-                raise CameraFileError('camera_info_url is empty; expected the file to write')
+                raise SettingError('camera_info_url is empty; expected the file to write')
             camera = camera_of(request.camera_info, self._settings.camera_name)
             if self._described and (mismatch := camera.size_mismatch(*self._described[1:])):
-                raise CameraFileError(mismatch)
+                raise CalibrationError(mismatch)
             write_camera(self._calibration_path, camera)
         except FisheyeError as error:
             response.success, response.status_message = False, str(error)

@@ -7,7 +7,7 @@ import pytest
 from fisheye_capture import calibration_url
 from fisheye_capture.calibration_url import calibration_of, calibration_path
 from fisheye_capture.synthetic import synthetic_lens
-from fisheye_core.errors import CameraFileError
+from fisheye_core.errors import SettingError
 from fisheye_geometry.camera_file import Camera, write_camera
 
 
@@ -41,7 +41,7 @@ def test_ros_home_is_in_the_home_where_nothing_else_is_said(monkeypatch):
 
 @pytest.mark.parametrize('variable', ['${HOME}', '${}', '${NAME'])
 def test_another_variable_is_named(variable):
-    with pytest.raises(CameraFileError, match=r'camera_info_url has \$\{.*; expected'):
+    with pytest.raises(SettingError, match=r'camera_info_url has \$\{.*; expected'):
         calibration_path(f'file:///a/{variable}', 'left')
 
 
@@ -58,7 +58,7 @@ def test_the_camera_of_a_file(tmp_path):
 
 @pytest.mark.parametrize('package', ['not_installed_anywhere', '..', ''])
 def test_a_package_that_is_not_there_is_named(package):
-    with pytest.raises(CameraFileError, match=f"names the package '{package}'"):
+    with pytest.raises(SettingError, match=f"names the package '{package}'"):
         calibration_path(f'package://{package}/left.yaml', 'left')
 
 
@@ -67,10 +67,10 @@ def test_a_package_that_is_not_there_is_named(package):
     [('~no_such_user/left.yaml', 'a user who is not known'), ('file:///a%00b', 'a zero byte')],
 )
 def test_what_can_be_no_path_is_refused(url, told):
-    with pytest.raises(CameraFileError, match=told):
+    with pytest.raises(SettingError, match=told):
         calibration_path(url, 'left')
 
 
 def test_another_scheme_is_refused():
-    with pytest.raises(CameraFileError, match="scheme 'http'; expected a path"):
+    with pytest.raises(SettingError, match="scheme 'http'; expected a path"):
         calibration_path('http://camera/left.yaml', 'left')

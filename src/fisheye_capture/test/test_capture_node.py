@@ -21,7 +21,7 @@ from fisheye_bridge.qos import IMAGE
 from fisheye_capture import live, source
 from fisheye_capture.capture_node import CaptureNode
 from fisheye_capture.synthetic import synthetic_lens
-from fisheye_core.errors import CameraFileError, FisheyeError, SettingError, SourceError
+from fisheye_core.errors import FileAccessError, FisheyeError, SettingError, SourceError
 from fisheye_geometry.camera_file import Camera, read_camera, write_camera
 from fisheye_testing.odd_pictures import turned
 
@@ -339,10 +339,10 @@ def test_the_diagnostics_do_not_tell_the_password(ros):
         ({'source': 'nowhere.png'}, SourceError, "source 'nowhere.png' is not there"),
         ({'frame_rate_hz': 0}, SettingError, 'frame_rate_hz'),
         ({'encoding': 'yuv'}, SettingError, 'bgr8, mono8, rgb8'),
-        ({'camera_info_url': 'http://x/y.yaml'}, CameraFileError, "scheme 'http'"),
-        ({'camera_info_url': 'package://nowhere_/y.yaml'}, CameraFileError, 'not installed'),
-        ({'camera_info_url': 'x' * 300}, CameraFileError, 'cannot be read: File name too long'),
-        ({'camera_info_url': '/dev/null/x'}, CameraFileError, 'cannot be read: Not a directory'),
+        ({'camera_info_url': 'http://x/y.yaml'}, SettingError, "scheme 'http'"),
+        ({'camera_info_url': 'package://nowhere_/y.yaml'}, SettingError, 'not installed'),
+        ({'camera_info_url': 'x' * 300}, FileAccessError, 'cannot be read: File name too long'),
+        ({'camera_info_url': '/dev/null/x'}, FileAccessError, 'cannot be read: Not a directory'),
     ],
 )
 def test_what_can_never_work_is_refused_at_start(ros, parameters, error, sentence):

@@ -1,12 +1,58 @@
 """Every error this project raises on purpose: one root, a family for each kind of cause."""
 
+from pathlib import Path
+
 
 class FisheyeError(Exception):
     """Root of all errors whose message is a sentence meant for the user."""
 
 
-class CameraFileError(FisheyeError):
-    """A calibration or overlap file cannot be read, written or believed."""
+class FileAccessError(FisheyeError):
+    """A file that cannot be read or written, whatever it holds.
+
+    Attributes
+    ----------
+    path : str or Path
+        Of the file.
+    action : str
+        What was tried: `read` or `written`.
+    reason : str
+        Why it failed.
+    """
+
+    def __init__(self, path: str | Path, action: str, reason: object):
+        super().__init__(f'{path} cannot be {action}: {reason}')
+        self.path, self.action, self.reason = path, action, str(reason)
+
+    def __reduce__(self):
+        return type(self), (self.path, self.action, self.reason)
+
+
+class FileContentError(FisheyeError):
+    """A file that was read, but does not hold what was expected.
+
+    Attributes
+    ----------
+    reason : str
+        What does not fit, with its line where there is one.
+    path : str or Path or None
+        Of the file; None where only its text is known.
+    """
+
+    def __init__(self, reason: object, path: str | Path | None = None):
+        super().__init__(f'{path}: {reason}' if path else str(reason))
+        self.reason, self.path = str(reason), path
+
+    def __reduce__(self):
+        return type(self), (self.reason, self.path)
+
+
+class CameraFileError(FileContentError):
+    """A calibration file that describes no possible camera."""
+
+
+class OverlapFileError(FileContentError):
+    """An overlap file that lacks something, or was measured on another rig."""
 
 
 class CalibrationError(FisheyeError):

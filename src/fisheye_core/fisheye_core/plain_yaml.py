@@ -9,7 +9,7 @@ from typing import Any
 
 import yaml
 
-from fisheye_core.errors import CameraFileError
+from fisheye_core.errors import FileContentError
 
 _MAX_DEPTH = 20
 _MAX_SIZE = 300_000
@@ -58,7 +58,7 @@ def parse_mapping(text: str) -> Mapping:
 
     Raises
     ------
-    CameraFileError
+    FileContentError
         If it is something else; the sentence names the line.
     """
     try:
@@ -66,10 +66,10 @@ def parse_mapping(text: str) -> Mapping:
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         line = f' at line {mark.line + 1}' if mark else ''
-        raise CameraFileError(f'not valid YAML{line}: {error.problem:.200}') from error
+        raise FileContentError(f'not valid YAML{line}: {error.problem:.200}') from error
     except (yaml.YAMLError, ValueError, OverflowError) as error:  # of characters that are none
         reason = str(error).splitlines()[0]
-        raise CameraFileError(f'not valid YAML: {reason}') from error
+        raise FileContentError(f'not valid YAML: {reason}') from error
 
 
 class _Events(yaml.reader.Reader, yaml.scanner.Scanner, yaml.parser.Parser):
@@ -108,14 +108,14 @@ class _Builder:
         events = self._events
         events.get_event()  # the stream's start
         if events.check_event(yaml.StreamEndEvent):
-            raise CameraFileError('it is empty; expected `key: value` lines')
+            raise FileContentError('it is empty; expected `key: value` lines')
         events.get_event()
         value = self._value(events.get_event(), 0)
         events.get_event()
         events.peek_event()  # anything but another document is an error
         if not isinstance(value, Mapping):
             kind = 'a list' if isinstance(value, list) else 'a single value'
-            raise CameraFileError(f'it holds {kind}; expected `key: value` lines')
+            raise FileContentError(f'it holds {kind}; expected `key: value` lines')
         return value
 
     def _value(self, event, depth: int):
@@ -124,7 +124,7 @@ class _Builder:
         self._count(1, line)
         if isinstance(event, yaml.AliasEvent):
             if event.anchor not in self._anchors:
-                raise CameraFileError(
+                raise FileContentError(
                     f'line {line}: it refers to `&{event.anchor:.40}`, which stands nowhere before'
                 )
             value, count = self._anchors[event.anchor]
@@ -132,7 +132,7 @@ class _Builder:
             return value
         _refuse_tag(event)
         if depth > _MAX_DEPTH:
-            raise CameraFileError(
+            raise FileContentError(
                 f'line {line}: it is more than {_MAX_DEPTH} levels deep; expected plain values'
             )
         if isinstance(event, yaml.ScalarEvent):
@@ -157,7 +157,7 @@ class _Builder:
         while not isinstance(event := self._events.get_event(), yaml.MappingEndEvent):
             line = event.start_mark.line + 1
             if not isinstance(event, yaml.ScalarEvent):
-                raise CameraFileError(f'line {line}: a key is no plain text')
+                raise FileContentError(f'line {line}: a key is no plain text')
             _refuse_tag(event)
             key = _text(event.value)
             mapping.lines[key] = line
@@ -170,13 +170,13 @@ class _Builder:
     def _count(self, count: int, line: int) -> None:
         self._size += count
         if self._size > _MAX_SIZE:
-            raise CameraFileError(f'line {line}: aliases repeat too much; expected plain values')
+            raise FileContentError(f'line {line}: aliases repeat too much; expected plain values')
 
 
 def _refuse_tag(event) -> None:
     if event.tag not in (None, _IGNORED_TAG):
         tag, line = event.tag.replace('tag:yaml.org,2002:', '!!'), event.start_mark.line + 1
-        raise CameraFileError(f'line {line}: it has the tag {tag!r:.60}; expected plain values')
+        raise FileContentError(f'line {line}: it has the tag {tag!r:.60}; expected plain values')
 
 
 def _scalar(text: str):

@@ -6,7 +6,7 @@ from typing import Any
 
 import yaml
 
-from fisheye_core.errors import CameraFileError
+from fisheye_core.errors import FileAccessError, FileContentError
 from fisheye_core.plain_yaml import Mapping, parse_mapping
 from fisheye_core.regular_file import is_missing, read_regular, replace_regular
 
@@ -21,15 +21,17 @@ def read_mapping(path: str | Path) -> Mapping:
 
     Raises
     ------
-    CameraFileError
-        If there is no such file, or it is too large, not text, not YAML or not a mapping; the
-        sentence names the file and, where there is one, the line.
+    FileAccessError
+        If it cannot be read.
+    FileContentError
+        If it is too large, not text, not YAML or not a mapping; the sentence names the file and,
+        where there is one, the line.
     """
     text = read_text(path)
     try:
         return parse_mapping(text)
-    except CameraFileError as error:
-        raise CameraFileError(f'{path}: {error}') from error
+    except FileContentError as error:
+        raise FileContentError(error.reason, path) from error
 
 
 def read_text(path: str | Path) -> str:
@@ -37,24 +39,26 @@ def read_text(path: str | Path) -> str:
 
     Raises
     ------
-    CameraFileError
-        If there is no such file, or it is too large or not text.
+    FileAccessError
+        If it cannot be read.
+    FileContentError
+        If it is too large or not text.
     """
     try:
         content = read_regular(path, _MAX_BYTES)
     except OSError as error:
-        raise CameraFileError(f'{path} cannot be read: {error.strerror}') from error
+        raise FileAccessError(path, 'read', error.strerror) from error
     if len(content) > _MAX_BYTES:
         # A topic that was echoed into a file: its first message is enough.
         content = content[: content.rfind(b'\n---') + 1]
         if not content:
-            raise CameraFileError(
-                f'{path} is larger than {_MAX_BYTES} bytes; expected a short YAML file'
+            raise FileContentError(
+                f'it is larger than {_MAX_BYTES} bytes; expected a short YAML file', path
             )
     try:
         return content.decode()
     except UnicodeDecodeError as error:
-        raise CameraFileError(f'{path} is not text (byte {error.start})') from error
+        raise FileContentError(f'it is not text (byte {error.start})', path) from error
 
 
 def is_number(value: Any) -> bool:
@@ -72,11 +76,11 @@ def write_mapping(path: str | Path, mapping: dict) -> None:
 
     Raises
     ------
-    CameraFileError
+    FileAccessError
         If the file cannot be written.
     """
     text = yaml.safe_dump(mapping, sort_keys=False, default_flow_style=None, width=100)
     try:
         replace_regular(path, text)
     except OSError as error:
-        raise CameraFileError(f'{path} cannot be written: {error.strerror}') from error
+        raise FileAccessError(path, 'written', error.strerror) from error

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from fisheye_core.errors import CameraFileError
+from fisheye_core.errors import FileContentError
 from fisheye_core.plain_yaml import parse_mapping
 
 
@@ -81,14 +81,14 @@ def test_keys_are_texts_and_lines_are_known():
     ],
 )
 def test_what_is_not_plain_is_refused(text, words):
-    with pytest.raises(CameraFileError, match=words):
+    with pytest.raises(FileContentError, match=words):
         parse_mapping(text)
 
 
 def test_aliases_cannot_blow_up():
     lines = ['a0: &a0 [x, x, x, x, x, x, x, x, x]']
     lines += [f'a{n}: &a{n} [{", ".join([f"*a{n - 1}"] * 9)}]' for n in range(1, 9)]
-    with pytest.raises(CameraFileError, match='aliases repeat too much'):
+    with pytest.raises(FileContentError, match='aliases repeat too much'):
         parse_mapping('\n'.join(lines))
-    with pytest.raises(CameraFileError, match='aliases repeat too much'):
+    with pytest.raises(FileContentError, match='aliases repeat too much'):
         parse_mapping(f'a: &a {"x" * 50_000}\nb: [{"*a," * 9}]')

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from fisheye_core.errors import CameraFileError
+from fisheye_core.errors import FileAccessError
 from fisheye_core.regular_file import read_regular, replace_regular
 from fisheye_core.yaml_file import read_mapping, write_mapping
 
@@ -27,9 +27,9 @@ def odd(tmp_path):
 @pytest.mark.parametrize('kind', ['a FIFO', 'a folder', 'a device'])
 def test_only_regular_files_are_read_and_replaced(odd, kind):
     told = f'it is {kind}; expected a regular file'
-    with pytest.raises(CameraFileError, match=f'cannot be read: {told}'):
+    with pytest.raises(FileAccessError, match=f'cannot be read: {told}'):
         read_mapping(odd[kind])
-    with pytest.raises(CameraFileError, match=f'cannot be written: {told}'):
+    with pytest.raises(FileAccessError, match=f'cannot be written: {told}'):
         write_mapping(odd[kind], {'a': 1})
 
 
@@ -47,7 +47,7 @@ def test_a_link_stays_and_its_file_is_replaced(tmp_path):
 def test_a_link_in_a_circle_is_refused(tmp_path):
     (tmp_path / 'a').symlink_to('b')
     (tmp_path / 'b').symlink_to('a')
-    with pytest.raises(CameraFileError, match='cannot be written'):
+    with pytest.raises(FileAccessError, match='cannot be written'):
         write_mapping(tmp_path / 'a', {})
 
 

@@ -6,7 +6,12 @@ of camera_info as `ros2 topic echo` prints it, and OpenCV's FileStorage with the
 
 from pathlib import Path
 
-from fisheye_core.errors import CalibrationError, CameraFileError
+from fisheye_core.errors import (
+    CalibrationError,
+    CameraFileError,
+    FileAccessError,
+    FileContentError,
+)
 from fisheye_core.plain_yaml import Mapping, parse_mapping
 from fisheye_core.yaml_file import is_number, read_text, shown, write_mapping
 from fisheye_geometry.calibration_ini import is_ini, parse_ini
@@ -36,15 +41,19 @@ def read_camera(path: str | Path) -> Camera:
 
     Raises
     ------
+    FileAccessError
+        If the file cannot be read.
     CameraFileError
-        If the file cannot be read, lacks something, or describes no possible camera; the
-        sentence names the file, the key, the value and what was expected.
+        If it lacks something, or describes no possible camera; the sentence names the file, the
+        key, the value and what was expected.
     """
-    text = read_text(path)
     try:
+        text = read_text(path)
         return _camera(parse_ini(text) if is_ini(text) else parse_mapping(text))
-    except (CalibrationError, CameraFileError) as error:
-        raise CameraFileError(f'{path}: {error}') from error
+    except FileContentError as error:
+        raise CameraFileError(error.reason, path) from error
+    except CalibrationError as error:
+        raise CameraFileError(error, path) from error
 
 
 def write_camera(path: str | Path, camera: Camera) -> None:
@@ -52,11 +61,11 @@ def write_camera(path: str | Path, camera: Camera) -> None:
 
     Raises
     ------
-    CameraFileError
+    FileAccessError
         If the file cannot be written, or its name says that it is an INI file.
     """
     if Path(path).suffix.lower() == '.ini':
-        raise CameraFileError(f'{path} cannot be written as INI; expected a name with .yaml')
+        raise FileAccessError(path, 'written as INI', 'expected a name with .yaml')
     lens = camera.lens
     write_mapping(
         path,

@@ -3,7 +3,7 @@
 import pytest
 import yaml
 
-from fisheye_core.errors import CameraFileError
+from fisheye_core.errors import CameraFileError, FileAccessError
 from fisheye_geometry.camera_file import Camera, read_camera, write_camera
 from fisheye_geometry.lens import make_lens
 
@@ -85,10 +85,10 @@ def test_a_broken_file_is_refused(tmp_path, content, words):
 
 
 def test_a_missing_file_and_an_unwritable_place_are_named(tmp_path):
-    with pytest.raises(CameraFileError, match='cannot be read: No such file'):
+    with pytest.raises(FileAccessError, match='cannot be read: No such file'):
         read_camera(tmp_path / 'none.yaml')
     (tmp_path / 'file').write_text('')
-    with pytest.raises(CameraFileError, match='cannot be written'):
+    with pytest.raises(FileAccessError, match='cannot be written'):
         write_camera(tmp_path / 'file' / 'camera.yaml', CAMERA)
 
 
@@ -265,5 +265,5 @@ def test_an_ini_file_that_is_broken_is_refused_with_its_line(tmp_path, old, new,
 
 
 def test_nothing_but_yaml_is_written(tmp_path):
-    with pytest.raises(CameraFileError, match=r'cannot be written as INI; expected .* \.yaml'):
+    with pytest.raises(FileAccessError, match=r'cannot be written as INI: expected .* \.yaml'):
         write_camera(tmp_path / 'left.ini', CAMERA)

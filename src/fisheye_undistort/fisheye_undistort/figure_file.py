@@ -4,7 +4,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from fisheye_core.errors import SettingError
+from fisheye_core.errors import FileAccessError, SettingError
 
 FORMATS = ('.pdf', '.svg', '.png')
 
@@ -24,16 +24,16 @@ def check_suffix(path: Path, what: str) -> None:
         )
 
 
-def write_figure(figure: Figure, path: Path, what: str, dpi: float) -> None:
-    """Write a figure in the format that the name says; `what` it is, for the sentence.
+def write_figure(figure: Figure, path: Path, dpi: float) -> None:
+    """Write a figure in the format that the name says.
 
     Raises
     ------
-    SettingError
+    FileAccessError
         If the file cannot be written.
     """
     try:
         figure.savefig(path, dpi=dpi)
     except (OSError, ValueError) as error:
         reason = getattr(error, 'strerror', None) or error
-        raise SettingError(f'{what} {path} cannot be written: {reason}') from error
+        raise FileAccessError(path, 'written', reason) from error

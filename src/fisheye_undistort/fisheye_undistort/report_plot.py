@@ -7,7 +7,7 @@ from textwrap import fill
 import numpy as np
 from matplotlib.figure import Figure
 
-from fisheye_core.errors import SettingError
+from fisheye_core.errors import FileAccessError
 from fisheye_geometry.remap import RemapTable
 from fisheye_geometry.surface import surface_for
 from fisheye_undistort.calibration import Calibration
@@ -28,11 +28,13 @@ def check_plot(path: Path) -> None:
     Raises
     ------
     SettingError
-        For a suffix that is no format of a figure, and for a folder that is not there.
+        For a suffix that is no format of a figure.
+    FileAccessError
+        For a folder that is not there.
     """
     check_suffix(path, 'a plot')
     if not os.path.isdir(path.parent):
-        raise SettingError(f'the plot {path} cannot be written: there is no folder {path.parent}')
+        raise FileAccessError(path, 'written', f'there is no folder {path.parent}')
 
 
 def plot_report(path: str | Path, report: Report, example: np.ndarray) -> None:
@@ -49,7 +51,7 @@ def plot_report(path: str | Path, report: Report, example: np.ndarray) -> None:
 
     Raises
     ------
-    SettingError
+    FileAccessError
         If the file cannot be written.
     """
     figure = Figure(figsize=_SIZE_INCH, layout='constrained')
@@ -62,7 +64,7 @@ def plot_report(path: str | Path, report: Report, example: np.ndarray) -> None:
     _distortion(figure.add_subplot(grid[1, 0]), report)
     _views(figure.add_subplot(grid[1, 1]), calibration)
     _undistorted(figure.add_subplot(grid[1, 2]), calibration, example)
-    write_figure(figure, Path(path), 'the plot', dpi=110)
+    write_figure(figure, Path(path), dpi=110)
 
 
 def _points(axes, calibration: Calibration, picture: np.ndarray) -> None:

@@ -34,13 +34,14 @@ def write_sheet(path: str | Path, target: Target) -> str:
     Raises
     ------
     SettingError
-        For a suffix that is no format of a figure, a target that fits no paper, or a file that
-        cannot be written.
+        For a suffix that is no format of a figure, and for a target that fits no paper.
+    FileAccessError
+        If the file cannot be written.
     """
     path = Path(path)
     check_suffix(path, 'a sheet')
     paper, size_mm = paper_for(target)
-    write_figure(_draw(target, paper, size_mm), path, 'the sheet', dpi=300)
+    write_figure(_draw(target, paper, size_mm), path, dpi=300)
     return paper
 
 

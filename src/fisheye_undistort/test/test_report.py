@@ -5,7 +5,7 @@ import pytest
 from conftest import seen_exactly
 from rendered_view import facing_pose, scattered_poses
 
-from fisheye_core.errors import SettingError
+from fisheye_core.errors import FileAccessError
 from fisheye_undistort.calibration import calibrate
 from fisheye_undistort.lens_fit import View
 from fisheye_undistort.report import Report
@@ -94,9 +94,9 @@ def test_the_plot_is_drawn(good, tmp_path):
     example = np.zeros(SIZE[::-1], np.uint8)
     plot_report(tmp_path / 'report.png', good, example)
     assert (tmp_path / 'report.png').stat().st_size > 50_000
-    with pytest.raises(SettingError, match='cannot be written'):
+    with pytest.raises(FileAccessError, match='cannot be written'):
         plot_report(tmp_path / 'nowhere' / 'report.png', good, example)
-    with pytest.raises(SettingError, match=r'report\.docx'):
+    with pytest.raises(FileAccessError, match=r'report\.docx'):
         plot_report(tmp_path / 'report.docx', good, example)
 
 

@@ -5,7 +5,7 @@ import cv2
 import numpy as np
 import pytest
 
-from fisheye_core.errors import SettingError
+from fisheye_core.errors import FileAccessError, SettingError
 from fisheye_undistort.detection import Detector
 from fisheye_undistort.target import KINDS, STANDARD, Target
 from fisheye_undistort.target_sheet import paper_for, sheet_picture, write_sheet
@@ -63,13 +63,17 @@ def test_the_smallest_paper_is_taken():
         ('sheet.docx', STANDARD['circles'], "'sheet.docx'"),
         ('sheet', STANDARD['circles'], '.pdf, .svg, .png'),
         ('sheet.pdf', Target('circles', 20, 20, 100, 100, radius_mm=9), 'A0 is the largest'),
-        ('nowhere/sheet.pdf', STANDARD['circles'], 'No such file'),
     ],
 )
 def test_what_cannot_be_printed_is_told(name, target, told, tmp_path):
     with pytest.raises(SettingError) as error:
         write_sheet(tmp_path / name, target)
     assert told in str(error.value)
+
+
+def test_a_file_that_cannot_be_written_is_told(tmp_path):
+    with pytest.raises(FileAccessError, match=r'sheet\.pdf cannot be written: No such file'):
+        write_sheet(tmp_path / 'nowhere' / 'sheet.pdf', STANDARD['circles'])
 
 
 def test_markers_are_those_of_opencv():

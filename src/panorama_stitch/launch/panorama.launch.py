@@ -17,7 +17,7 @@ from ament_index_python.packages import (
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironmentVariable
 from launch_ros.actions import Node, SetParameter
 
-from fisheye_core.errors import CameraFileError
+from fisheye_core.errors import FileAccessError, FileContentError
 from fisheye_core.yaml_file import read_mapping
 from launch import LaunchDescription, logging
 
@@ -220,8 +220,8 @@ def measured_yaw_deg(path):
         is_angle = overlap['found'] and left['surface'] != 'rectilinear'
         apart_px = overlap['offset_x_px'] + right['center_x_px'] - left['center_x_px']
         yaw_deg = degrees(apart_px / left['focal_px'])
-    except CameraFileError as error:
-        reason = str(error).removeprefix(f'{path}: ')
+    except (FileAccessError, FileContentError) as error:
+        reason = error.reason
         raise RuntimeError(f'{path} is not the overlap file of two cameras: {reason}') from error
     except (KeyError, TypeError, ValueError, ArithmeticError) as error:
         raise RuntimeError(f'{path} is not the overlap file of two cameras') from error

@@ -8,7 +8,7 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fisheye_core.errors import CameraFileError
+from fisheye_core.errors import FileAccessError, OverlapFileError
 from fisheye_geometry.remap import Turn
 from fisheye_geometry.surface import Surface
 from panorama_stitch.overlap.overlap_file import read_overlaps, write_overlaps
@@ -90,7 +90,7 @@ def test_rounding_of_a_calibration_does_not_matter(path):
 )
 def test_another_rig_is_refused(path, cameras, changes, sentence):
     surfaces = [replace(surface, **changes) for surface in SURFACES[: len(cameras)]]
-    with pytest.raises(CameraFileError, match=sentence) as error:
+    with pytest.raises(OverlapFileError, match=sentence) as error:
         read_overlaps(path, cameras, surfaces)
     assert str(path) in str(error.value)
 
@@ -112,7 +112,7 @@ def test_another_rig_is_refused(path, cameras, changes, sentence):
 )
 def test_a_broken_file_is_refused_with_a_sentence(path, change, sentence):
     edit(path, change)
-    with pytest.raises(CameraFileError, match=sentence):
+    with pytest.raises(OverlapFileError, match=sentence):
         read_overlaps(path, CAMERAS, SURFACES)
 
 
@@ -122,7 +122,7 @@ def test_a_missing_file_is_none(tmp_path):
 
 
 def test_a_file_that_cannot_be_looked_at_is_told():
-    with pytest.raises(CameraFileError, match='cannot be read: File name too long'):
+    with pytest.raises(FileAccessError, match='cannot be read: File name too long'):
         read_overlaps('x' * 5000, CAMERAS, SURFACES)
 
 
@@ -134,7 +134,7 @@ def test_what_no_rig_can_have_is_refused(path):
     good = path.read_text()
     for key, value in (('offset_x_px', 1e9), ('offset_y_px', -5000), ('roll_deg', 90)):
         path.write_text(re.sub(f'{key}: [^,}}]*', f'{key}: {value}', good, count=1))
-        with pytest.raises(CameraFileError, match=f'{key} of .*; expected a finite number up to'):
+        with pytest.raises(OverlapFileError, match=f'{key} of .*; expected a finite number up to'):
             read_overlaps(path, CAMERAS, SURFACES)
 
 
@@ -164,7 +164,7 @@ def test_a_file_that_was_changed_anyhow_is_read_or_refused(path, at, count, piec
     changed.write_text(good[:at] + piece + good[at + count :], encoding='utf-8')
     try:
         overlaps = read_overlaps(changed, CAMERAS, SURFACES)
-    except CameraFileError as error:
+    except OverlapFileError as error:
         assert str(changed) in str(error)
     else:
         assert [overlap.method for overlap in overlaps] == [FIRST.method, SECOND.method]
@@ -172,7 +172,7 @@ def test_a_file_that_was_changed_anyhow_is_read_or_refused(path, at, count, piec
 
 def test_a_fifo_is_refused_and_a_link_stays(tmp_path, path):
     os.mkfifo(tmp_path / 'fifo')
-    with pytest.raises(CameraFileError, match='it is a FIFO; expected a regular file'):
+    with pytest.raises(FileAccessError, match='it is a FIFO; expected a regular file'):
         read_overlaps(tmp_path / 'fifo', CAMERAS, SURFACES)
     link = tmp_path / 'link.yaml'
     link.symlink_to(path)

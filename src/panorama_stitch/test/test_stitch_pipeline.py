@@ -13,7 +13,7 @@ import pytest
 
 from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens
-from fisheye_core.errors import CameraFileError, ImageFormatError, OverlapError
+from fisheye_core.errors import FileAccessError, ImageFormatError, OverlapError
 from fisheye_geometry.remap import RemapTable, Turn
 from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.pipeline.metrics import economy_sentence, metrics, unpaired_sentence
@@ -215,7 +215,7 @@ def test_what_cannot_be_done_is_said(make_line, pictures, tmp_path):
     (tmp_path / 'file').write_text('')
     line.pipeline.apply(replace(SETTINGS, overlap_file=str(tmp_path / 'file' / 'overlap.yaml')))
     before = overlap_in_use(line)
-    with pytest.raises(CameraFileError, match='cannot be written'):
+    with pytest.raises(FileAccessError, match='cannot be written'):
         line.pipeline.calibrate('', save=True).result(DEADLINE_S)
     assert overlap_in_use(line) is before, 'what was in use stays in use'
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from fisheye_core.errors import SettingError
+from fisheye_core.errors import FileAccessError
 from fisheye_geometry.remap import RemapTable
 from fisheye_geometry.surface import Surface
 from panorama_viewer.projection import described
@@ -58,7 +58,7 @@ def save(path: Path, form: str, image: np.ndarray, surface: Surface, stamp_ns: i
 
     Raises
     ------
-    SettingError
+    FileAccessError
         If a file cannot be written.
     """
     if os.path.isdir(path):
@@ -159,5 +159,5 @@ def _write(path: Path, content: bytes) -> Path:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content)
     except OSError as error:
-        raise SettingError(f'{path} cannot be written: {error.strerror}') from error
+        raise FileAccessError(path, 'written', error.strerror) from error
     return path

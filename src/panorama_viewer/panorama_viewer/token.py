@@ -6,8 +6,9 @@ import secrets
 import stat
 from pathlib import Path
 
-from fisheye_core.errors import SettingError
+from fisheye_core.errors import FileAccessError, FileContentError
 
+_ACTION = 'used as token_file'
 _LONGEST = 200
 _TOKEN = re.compile(r'[\w-]{8,100}', re.ASCII)
 
@@ -22,8 +23,10 @@ def kept_token(path: Path) -> str:
 
     Raises
     ------
-    SettingError
-        If the file cannot be read or written, others can read it, or it holds no token.
+    FileAccessError
+        If the file cannot be read or written, or others can read it.
+    FileContentError
+        If it holds no token.
     """
     try:
         try:
@@ -34,7 +37,7 @@ def kept_token(path: Path) -> str:
         except FileExistsError:
             return _read(path)
     except OSError as error:
-        raise SettingError(f'token_file {path} cannot be used: {error.strerror}') from error
+        raise FileAccessError(path, _ACTION, error.strerror) from error
 
 
 def _read(path: Path) -> str:
@@ -42,16 +45,14 @@ def _read(path: Path) -> str:
     with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), 'rb') as file:
         mode = os.fstat(file.fileno()).st_mode
         if not stat.S_ISREG(mode):
-            raise SettingError(f'token_file {path} is not a regular file')
+            raise FileAccessError(path, _ACTION, 'it is not a regular file')
         if mode & 0o077:
-            raise SettingError(
-                f'token_file {path} has mode {mode & 0o777:o}, so that others can read it; '
-                'expected 600'
-            )
+            reason = f'others can read it, its mode is {mode & 0o777:o}; expected 600'
+            raise FileAccessError(path, _ACTION, reason)
         token = file.read(_LONGEST).decode(errors='replace').strip()
     if not _TOKEN.fullmatch(token):
-        raise SettingError(
-            f'token_file {path} holds no token; expected 8 to 100 letters, digits, - and _'
+        raise FileContentError(
+            'it holds no token; expected 8 to 100 letters, digits, - and _', path
         )
     return token
 

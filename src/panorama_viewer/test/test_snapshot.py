@@ -8,7 +8,7 @@ import pytest
 from fisheye_msgs.msg import Projection
 
 from fisheye_bridge.projection import surface_of
-from fisheye_core.errors import SettingError
+from fisheye_core.errors import FileAccessError
 from fisheye_geometry.surface import Surface
 from panorama_viewer.snapshot import gpano, on_sphere, save
 
@@ -122,5 +122,5 @@ def test_only_the_suffix_of_a_picture_is_replaced(tmp_path, given, expected):
 
 def test_a_file_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / 'file').touch()
-    with pytest.raises(SettingError, match=r'file/here\.png cannot be written'):
+    with pytest.raises(FileAccessError, match=r'file/here\.png cannot be written'):
         save(tmp_path / 'file' / 'here', 'png', np.zeros((480, 1200)), SURFACES[0], STAMP_NS)

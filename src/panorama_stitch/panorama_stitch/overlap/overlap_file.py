@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from math import degrees, inf, radians
 from pathlib import Path
 
-from fisheye_core.errors import CameraFileError
+from fisheye_core.errors import FileContentError, OverlapFileError
 from fisheye_core.yaml_file import is_missing, is_number, read_mapping, shown, write_mapping
 from fisheye_geometry.remap import Turn
 from fisheye_geometry.surface import Surface
@@ -40,7 +40,7 @@ def write_overlaps(
 
     Raises
     ------
-    CameraFileError
+    FileAccessError
         If the file cannot be written.
     """
     write_mapping(
@@ -63,22 +63,24 @@ def read_overlaps(
 
     Raises
     ------
-    CameraFileError
-        If the file cannot be read, lacks something, or was measured on another rig; the sentence
-        names the file and what does not fit.
+    FileAccessError
+        If the file cannot be read.
+    OverlapFileError
+        If it lacks something, or was measured on another rig; the sentence names the file and
+        what does not fit.
     """
     path = os.path.expanduser(path)
     if not path or is_missing(path):
         return None
-    entries = read_mapping(path)
     try:
+        entries = read_mapping(path)
         if entries.get('version') != VERSION:
             version = shown(entries.get('version'))
-            raise CameraFileError(f'version is {version}; expected {VERSION}')
+            raise OverlapFileError(f'version is {version}; expected {VERSION}')
         _check_cameras(_list(entries, 'cameras'), cameras, surfaces)
         measured = _list(entries, 'overlaps')
         if len(measured) != len(cameras) - 1:
-            raise CameraFileError(
+            raise OverlapFileError(
                 f'{len(measured)} overlaps for {len(cameras)} cameras; expected one for each '
                 'pair of neighbours'
             )
@@ -86,8 +88,8 @@ def read_overlaps(
             _overlap(*neighbours)
             for neighbours in zip(cameras[:-1], cameras[1:], surfaces[:-1], measured, strict=True)
         ]
-    except CameraFileError as error:
-        raise CameraFileError(f'{path}: {error}') from error
+    except FileContentError as error:
+        raise OverlapFileError(error.reason, path) from error
 
 
 def _camera(name: str, surface: Surface) -> dict:
@@ -118,14 +120,14 @@ def _entry(left: str, right: str, overlap: Overlap) -> dict:
 def _list(entries: dict, key: str) -> list[dict]:
     value = entries.get(key)
     if not isinstance(value, list) or not all(isinstance(entry, dict) for entry in value):
-        raise CameraFileError(f'{key} is {shown(value)}; expected a list of `key: value` blocks')
+        raise OverlapFileError(f'{key} is {shown(value)}; expected a list of `key: value` blocks')
     return value
 
 
 def _check_cameras(entries, cameras, surfaces) -> None:
     names = [entry.get('name') for entry in entries]
     if names != list(cameras):
-        raise CameraFileError(
+        raise OverlapFileError(
             f'it is for the cameras {", ".join(map(shown, names))}; these are {", ".join(cameras)}'
         )
     for entry, name, surface in zip(entries, cameras, surfaces, strict=True):
@@ -138,7 +140,7 @@ def _check_cameras(entries, cameras, surfaces) -> None:
                 value = round(value, 3)
             elif then == value:
                 continue
-            raise CameraFileError(
+            raise OverlapFileError(
                 f"it was measured with camera '{name}' at {key} {shown(then)}; now it is {value}"
             )
 
@@ -147,7 +149,7 @@ def _overlap(left: str, right: str, surface: Surface, entry: dict) -> Overlap:
     pair = f"the overlap of '{left}' and '{right}'"
     if (entry.get('left'), entry.get('right')) != (left, right):
         neighbours = f'{shown(entry.get("left"))}, {shown(entry.get("right"))}'
-        raise CameraFileError(f'{pair} is missing; found {neighbours}')
+        raise OverlapFileError(f'{pair} is missing; found {neighbours}')
     limits = {
         'offset_x_px': surface.width,
         'offset_y_px': surface.height,
@@ -158,15 +160,15 @@ def _overlap(left: str, right: str, surface: Surface, entry: dict) -> Overlap:
         value = entry.get(key)
         limit = limits.get(key, inf)
         if not is_number(value) or abs(value) > limit:
-            raise CameraFileError(
+            raise OverlapFileError(
                 f'{key} of {pair} is {shown(value)}; expected a finite number up to {limit:g}'
             )
     if type(entry.get('found')) is not bool:
         found = shown(entry.get('found'))
-        raise CameraFileError(f'found of {pair} is {found}; expected true or false')
+        raise OverlapFileError(f'found of {pair} is {found}; expected true or false')
     if entry.get('method') not in METHODS:
         method, methods = shown(entry.get('method')), ', '.join(METHODS)
-        raise CameraFileError(f'method of {pair} is {method}; expected one of {methods}')
+        raise OverlapFileError(f'method of {pair} is {method}; expected one of {methods}')
     message = entry.get('message')
     return Overlap(
         method=entry['method'],
