@@ -37,7 +37,7 @@ WIDTHS = (320, 640, 1280, 1920, 2560)
 
 
 @dataclass(frozen=True)
-class Result:
+class CalibrationResult:
     """Errors against the truth, and seconds taken."""
 
     focal_percent: float
@@ -50,7 +50,7 @@ class Result:
 
 
 def fisheye(fov_deg: int, width: int) -> FisheyeLens:
-    """Give a lens that sees `fov_deg` across a picture of 4 to 3."""
+    """Return a lens that sees `fov_deg` across a picture of 4 to 3."""
     focal, distortion = LENSES[fov_deg]
     scale = width / 640
     return FisheyeLens(
@@ -82,7 +82,9 @@ def angle_error_deg(lens: FisheyeLens, truth: FisheyeLens, reach_rad: float) -> 
     return float(np.degrees(np.abs(np.arctan2(back[:, 0], back[:, 2]) - angles).max()))
 
 
-def measure(truth: FisheyeLens, target: Target, pictures, *, correct_bias=True) -> Result:
+def measure(
+    truth: FisheyeLens, target: Target, pictures, *, correct_bias=True
+) -> CalibrationResult:
     """Calibrate from pictures and compare with the truth."""
     # Small circles are wanted here: the particle filter's limit is that of a 640x480 picture.
     detect = Detector(target, min_area_px=60.0)
@@ -92,7 +94,7 @@ def measure(truth: FisheyeLens, target: Target, pictures, *, correct_bias=True) 
     calibration = calibrate(views, target, (truth.width, truth.height), correct_bias=correct_bias)
     fitted = time.perf_counter()
     lens, reach = calibration.lens, calibration.directions_rad[0].max()
-    return Result(
+    return CalibrationResult(
         focal_percent=100 * abs(lens.focal_x_px / truth.focal_x_px - 1),
         center_px=float(
             np.hypot(lens.center_x_px - truth.center_x_px, lens.center_y_px - truth.center_y_px)
@@ -126,7 +128,7 @@ def accuracy() -> None:
             )
 
 
-def against_circles() -> list[tuple[int, Result]]:
+def against_circles() -> list[tuple[int, CalibrationResult]]:
     """Measure and print time and error against the number of circles, at 1280x960."""
     print('\ncircles  find, ms a picture  fit, s  focal length, %  angle, degrees')
     truth, rows = fisheye(170, 1280), []
@@ -157,7 +159,7 @@ def against_size() -> list[tuple[str, float]]:
     return rows
 
 
-def draw(circles: list[tuple[int, Result]], sizes: list[tuple[str, float]]) -> None:
+def draw(circles: list[tuple[int, CalibrationResult]], sizes: list[tuple[str, float]]) -> None:
     """Draw both tables."""
     figure = Figure(figsize=(12, 4.5), layout='constrained')
     left, right = figure.subplots(1, 2)

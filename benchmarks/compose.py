@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from pairs import Pair, synthetic_pair
-from targets import Target
+from pairs import ImagePair, synthetic_pair
+from targets import Requirement
 from timing import Spread, interleaved, spread
 
 from fisheye_geometry.attitude import LEVEL, Attitude
@@ -46,7 +46,7 @@ class Composing:
 
     @property
     def name(self) -> str:
-        """Say what was measured."""
+        """Return what was measured, as a line."""
         return f'{self.width}x{self.height} {self.interpolation}, {self.threads} thread(s)'
 
     @property
@@ -73,22 +73,22 @@ def measure_composing(short: bool) -> list[Composing]:
     return results
 
 
-def composing_targets(results: list[Composing]) -> list[Target]:
-    """Give what composing has to reach."""
+def composing_targets(results: list[Composing]) -> list[Requirement]:
+    """Return the requirements of composing."""
     targets = []
     for result in results:
         way = {'linear': 'feather', 'nearest': 'none'}.get(result.interpolation)
         if way:
-            targets.append(Target(f'{result.name}, {way}, floors', result.to_floor[way], 1.0))
+            targets.append(Requirement(f'{result.name}, {way}, floors', result.to_floor[way], 1.0))
         if (result.width, result.interpolation) == (640, 'linear'):
             ratio = result.to_one_remap['feather']
-            targets.append(Target(f'{result.name}, feather, remaps', ratio, 1.0))
+            targets.append(Requirement(f'{result.name}, feather, remaps', ratio, 1.0))
             ratio = result.to_floor['feather, gain'] / result.to_floor['feather']
-            targets.append(Target(f'{result.name}, with gain over without', ratio, 1.1))
+            targets.append(Requirement(f'{result.name}, with gain over without', ratio, 1.1))
     for kind in sorted({(r.interpolation, r.threads) for r in results}):
         costs = [r.ms_per_megapixel for r in results if (r.interpolation, r.threads) == kind]
         what = '{}, {} thread(s), dearest over cheapest megapixel'.format(*kind)
-        targets.append(Target(what, max(costs) / min(costs), 1.5))
+        targets.append(Requirement(what, max(costs) / min(costs), 1.5))
     return targets
 
 
@@ -103,7 +103,7 @@ def summary(size, interpolation: str, threads: int, megapixels: float, times) ->
 
 
 def prepare(size: tuple[int, int], interpolation: str) -> tuple[dict[str, Callable], float]:
-    """Give functions that compose a pair in every way, and the megapixels of a panorama."""
+    """Return functions that compose a pair in every way, and the megapixels of a panorama."""
     equal, unlike = synthetic_pair(*size), synthetic_pair(*size, UNLIKE)
     # Each way has pictures of its own: they come from memory, as those of a camera do.
     ways = {}
@@ -121,14 +121,14 @@ def prepare(size: tuple[int, int], interpolation: str) -> tuple[dict[str, Callab
     return {way: ways[way] for way in WAYS}, surface.width * surface.height / 1e6
 
 
-def compositor_of(pair: Pair, blend: str, interpolation: str, gain: bool) -> Compositor:
+def compositor_of(pair: ImagePair, blend: str, interpolation: str, gain: bool) -> Compositor:
     """Build the product's compositor."""
     settings = PanoramaSettings(blend=blend, interpolation=interpolation, gain_compensation=gain)
     return pair.stitcher(settings).compositor(settings, pair.images)
 
 
-def composing(pair: Pair, blend: str, interpolation: str, gain: bool):
-    """Give a function that composes a pair, and the array (height, width, 3) that it fills."""
+def composing(pair: ImagePair, blend: str, interpolation: str, gain: bool):
+    """Return a function that composes a pair, and the array (height, width, 3) that it fills."""
     compositor = compositor_of(pair, blend, interpolation, gain)
     surface = compositor.layout.surface
     out = np.empty((surface.height, surface.width, 3), np.uint8)
@@ -136,12 +136,12 @@ def composing(pair: Pair, blend: str, interpolation: str, gain: bool):
     return lambda: compositor.compose(images, out), out
 
 
-def own(pair: Pair) -> list[np.ndarray]:
-    """Give copies of a pair's pictures."""
+def own(pair: ImagePair) -> list[np.ndarray]:
+    """Return copies of a pair's pictures."""
     return [image.copy() for image in pair.images]
 
 
-def floor(pair: Pair, views: Sequence[View], interpolation: str) -> Callable[[], None]:
+def floor(pair: ImagePair, views: Sequence[View], interpolation: str) -> Callable[[], None]:
     """Correct both whole frames."""
     tables = [fixed(positions(view.source, view.surface), interpolation) for view in views]
     outs = [np.empty((v.surface.height, v.surface.width, 3), np.uint8) for v in views]
@@ -154,7 +154,7 @@ def floor(pair: Pair, views: Sequence[View], interpolation: str) -> Callable[[],
     return correct
 
 
-def one_remap(pair: Pair, views, layout: Layout, interpolation: str, out: np.ndarray):
+def one_remap(pair: ImagePair, views, layout: Layout, interpolation: str, out: np.ndarray):
     """Draw the whole panorama at once."""
     middle = sum(layout.seams[0]) // 2
     parts = [
@@ -167,7 +167,7 @@ def one_remap(pair: Pair, views, layout: Layout, interpolation: str, out: np.nda
     return lambda: cv2.remap(stacked, *table, FLAGS[interpolation], dst=out)
 
 
-def naive(pair: Pair, views, layout: Layout, interpolation: str, out: np.ndarray):
+def naive(pair: ImagePair, views, layout: Layout, interpolation: str, out: np.ndarray):
     """Draw what shows of each view, and feather where both do."""
     begin, end = layout.seams[0]
     tables = [
@@ -202,7 +202,7 @@ def positions(lens: Lens, surface: Surface, attitude: Attitude = LEVEL) -> np.nd
 
 
 def fixed(where: np.ndarray, interpolation: str) -> tuple[np.ndarray, np.ndarray | None]:
-    """Give fixed-point maps."""
+    """Return fixed-point maps."""
     nearest = interpolation == 'nearest'
     pixels, fractions = cv2.convertMaps(where, None, cv2.CV_16SC2, nninterpolation=nearest)
     return pixels, None if nearest else fractions

@@ -9,7 +9,7 @@ import numpy as np
 
 
 def describe_machine() -> dict[str, object]:
-    """Give the machine's description and how busy it is with other things."""
+    """Return the machine's description and how busy it is with other things."""
     return {
         'processor': _processor(),
         'cores': len(os.sched_getaffinity(0)),

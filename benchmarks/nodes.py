@@ -11,11 +11,11 @@ import cv2
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from pairs import SIDES, synthetic_pair
-from targets import Target
+from targets import Requirement
 
 from fisheye_geometry.camera_file import Camera, write_camera
 from fisheye_testing.health import usage
-from fisheye_testing.rig import Rig, camera_parameters, unused_domain, wait_for
+from fisheye_testing.rig import RigProcesses, camera_parameters, unused_domain, wait_for
 from fisheye_testing.watcher import Watcher
 
 FULL_SPEED_HZ = 1000.0
@@ -133,20 +133,20 @@ def measure_nodes(seconds: float, log_folder: Path) -> Iterator[Run]:
         yield run_rig(setup, seconds, log_folder)
 
 
-def node_targets(runs: Sequence[Run]) -> list[Target]:
-    """Give what the nodes have to reach."""
+def node_targets(runs: Sequence[Run]) -> list[Requirement]:
+    """Return the requirements of the nodes."""
     setups = {setup.name: setup for setup in SETUPS}
     targets = []
     for run in runs:
         for limits, is_least in ((setups[run.name].most, False), (setups[run.name].least, True)):
             for what, limit in limits.items():
                 measured = getattr(run, what)
-                targets.append(Target(f'{run.name}, {what}', measured, limit, is_least))
+                targets.append(Requirement(f'{run.name}, {what}', measured, limit, is_least))
     p99_ms = {run.name: run.p99_ms for run in runs}
     for name, feather, limit in _FLOW_MS:
         if {name, feather} <= set(p99_ms):
             later_ms = max(0.0, p99_ms[name] - p99_ms[feather])
-            targets.append(Target(f'{name}, p99_ms later', later_ms, limit))
+            targets.append(Requirement(f'{name}, p99_ms later', later_ms, limit))
     return targets
 
 
@@ -156,7 +156,7 @@ def run_rig(setup: Setup, seconds: float, log_folder: Path) -> Run:
     with (
         tempfile.TemporaryDirectory() as folder,
         Watcher(domain) as watcher,
-        Rig(domain, log_folder) as rig,
+        RigProcesses(domain, log_folder) as rig,
     ):
         cameras = camera_parameters(save_pair(Path(folder), setup.size))
         counts = Counts(watcher)
@@ -202,7 +202,7 @@ def save_pair(folder: Path, size: tuple[int, int]) -> Path:
     return folder
 
 
-def cpu_s(rig: Rig) -> float:
+def cpu_s(rig: RigProcesses) -> float:
     """Processor time that the nodes have used."""
     return sum(_ticks(process.pid) for process in rig.processes.values()) / _TICKS_PER_S
 

@@ -38,7 +38,7 @@ PICTURES = 20
 
 
 @dataclass(frozen=True)
-class Result:
+class CaseResult:
     """What one method said of one case; NaN where there is nothing to compare with."""
 
     group: str
@@ -102,20 +102,20 @@ def _match_template(case: Case) -> None:
 
 
 def _timed(function, *arguments):
-    """Give a result and the processor time it took, ms; other programs do not count."""
+    """Return a result and the processor time it took, ms; other programs do not count."""
     start = time.process_time()
     result = function(*arguments)
     return result, (time.process_time() - start) * 1e3
 
 
-def _compare(case: Case, method: str, overlap: Overlap, ms: float, times: float) -> Result:
+def _compare(case: Case, method: str, overlap: Overlap, ms: float, times: float) -> CaseResult:
     left, right = case.surfaces
     error_px = error_deg = nan
     level = left.center_x_px - right.center_x_px
     if case.offset_deg is not None and overlap.found:
         error_px = overlap.offset_x_px - level - left.focal_px * radians(case.offset_deg)
         error_deg = degrees(error_px / left.focal_px)
-    return Result(
+    return CaseResult(
         group=case.group,
         name=case.name,
         method=method,
@@ -132,7 +132,7 @@ def _compare(case: Case, method: str, overlap: Overlap, ms: float, times: float)
     )
 
 
-def _print_table(results: list[Result]) -> None:
+def _print_table(results: list[CaseResult]) -> None:
     print(
         'method      rigs         number  in 1 px  in 0.5 deg  worst deg  missed  false'
         '      ms  times matchTemplate'
@@ -159,8 +159,8 @@ def _print_table(results: list[Result]) -> None:
             )
 
 
-def _complaints(results: list[Result]) -> Iterator[str]:
-    """Say which targets `particles` misses."""
+def _complaints(results: list[CaseResult]) -> Iterator[str]:
+    """Yield the targets that `particles` misses."""
     mine = [r for r in results if r.method == 'particles']
     wide = [r for r in mine if r.group == 'random']
     right = np.mean([r.found and abs(r.error_deg) <= RIGHT_DEG for r in wide])

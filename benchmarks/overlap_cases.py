@@ -30,7 +30,7 @@ class Case:
 
 
 def cases(seed: int, count: int) -> Iterator[Case]:
-    """Give the real rigs, then `count` times three random ones and `count` without overlap."""
+    """Return the real rigs, then `count` times three random ones and `count` without overlap."""
     yield _synthetic()
     yield from _real()
     for i in range(3 * count):
@@ -45,7 +45,7 @@ def _synthetic() -> Case:
 
 
 def _real() -> Iterator[Case]:
-    """Give the rigs of real pictures, and what the left and right views of two places make."""
+    """Return the rigs of real pictures, and what the left and right views of two places make."""
     folders = [path.parent for path in sorted((DATA / 'rigs').glob('*/truth.json'))]
     if not folders:
         print('No rigs of real pictures are there; set FISHEYE_DATA to their folder.')

@@ -26,7 +26,7 @@ DATA = Path(os.environ.get('FISHEYE_DATA', ''))
 
 
 @dataclass(frozen=True)
-class Pair:
+class ImagePair:
     """Two pictures (height, width, 3) uint8 BGR, from left to right, and their lenses."""
 
     name: str
@@ -47,17 +47,17 @@ class Pair:
         return stitcher
 
 
-def synthetic_pair(width: int, height: int, gains: Sequence[float] = (1.0, 1.0)) -> Pair:
-    """Take pictures of the synthetic world with two exposures."""
+def synthetic_pair(width: int, height: int, gains: Sequence[float] = (1.0, 1.0)) -> ImagePair:
+    """Photograph the synthetic world with two exposures."""
     lens = synthetic_lens(width, height, radians(170))
     images = [
         Scene().view(lens, Turn(yaw_rad=yaw), gain).frame(0)
         for yaw, gain in zip(YAWS, gains, strict=True)
     ]
-    return Pair('synthetic', [lens, lens], images, is_synthetic=True)
+    return ImagePair('synthetic', [lens, lens], images, is_synthetic=True)
 
 
-def folder_pair(folder: Path) -> Pair:
+def folder_pair(folder: Path) -> ImagePair:
     """Read left and right .png and .yaml."""
     lenses, images = [], []
     for side in SIDES:
@@ -67,10 +67,10 @@ def folder_pair(folder: Path) -> Pair:
         circle.look(image)
         lenses.append(lens.with_max_angle(circle.angle_rad))
         images.append(image)
-    return Pair(folder.name, lenses, images)
+    return ImagePair(folder.name, lenses, images)
 
 
-def real_pairs() -> list[Pair]:
+def real_pairs() -> list[ImagePair]:
     """Read the rigs of `DATA` whose views overlap; none where the folder is absent."""
     return [
         folder_pair(path.parent)

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from pairs import YAWS, Pair, real_pairs, synthetic_pair
+from pairs import YAWS, ImagePair, real_pairs, synthetic_pair
 from seams import judge_seams
 from similarity import similarity_map
 
@@ -79,7 +79,7 @@ def main() -> int:
 
 
 def report(results: list[Quality]) -> int:
-    """Say whether the synthetic rig with unlike exposures meets the targets."""
+    """Return whether the synthetic rig with unlike exposures meets the targets."""
     unlike, alike = (
         next(r for r in results if r.rig == f'synthetic {a} : {b}' and r.gain and r.blend == how)
         for (a, b), how in ((EXPOSURES[1], 'feather'), (EXPOSURES[0], 'feather'))
@@ -95,7 +95,7 @@ def report(results: list[Quality]) -> int:
     return not all(checks.values())
 
 
-def judged(pair: Pair, gains):
+def judged(pair: ImagePair, gains):
     """Judge each way to compose a pair; `gains` are the exposures of the synthetic rig."""
     settings = PanoramaSettings()
     stitcher = pair.stitcher(settings)
@@ -105,7 +105,7 @@ def judged(pair: Pair, gains):
             yield judge(pair, stitcher.compositor(ours, pair.images), ours, gains)
 
 
-def judge(pair: Pair, compositor: Compositor, settings: PanoramaSettings, gains) -> Quality:
+def judge(pair: ImagePair, compositor: Compositor, settings: PanoramaSettings, gains) -> Quality:
     """Judge one way to compose a pair."""
     surface = compositor.layout.surface
     out = np.empty((surface.height, surface.width, 3), np.uint8)
@@ -133,7 +133,7 @@ def judge(pair: Pair, compositor: Compositor, settings: PanoramaSettings, gains)
     )
 
 
-def at_the_seam(out, pair: Pair, compositor: Compositor) -> tuple[np.ndarray, float]:
+def at_the_seam(out, pair: ImagePair, compositor: Compositor) -> tuple[np.ndarray, float]:
     """Step beside the seam, one number a patch of rows, and the sharpest edge in it."""
     layout, px_per_deg = compositor.layout, np.radians(compositor.layout.surface.focal_px)
     seam, reach = layout.seams[0], max(2, round(PATCH_DEG * px_per_deg))
@@ -153,7 +153,7 @@ def at_the_seam(out, pair: Pair, compositor: Compositor) -> tuple[np.ndarray, fl
     return step[np.isfinite(step)], float(np.nanmax(np.abs(np.diff(profile))))
 
 
-def flicker(pair: Pair, compositor: Compositor, columns: slice, gains) -> float:
+def flicker(pair: ImagePair, compositor: Compositor, columns: slice, gains) -> float:
     """Standard deviation over time of the brightness at the seam, against the truth."""
     rng = np.random.default_rng(1)
     noise = rng.normal(0, NOISE, (NOISES, *pair.images[0].shape)).round().astype(np.int16)

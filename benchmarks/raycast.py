@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 
-class Seen(NamedTuple):
+class Hit(NamedTuple):
     """What rays meet, which of them, in which colour (n, 3) uint8 and how far away."""
 
     rays: np.ndarray
@@ -26,7 +26,7 @@ class Cylinder:
     bottom: float
     texture: np.ndarray
 
-    def meet(self, x: float, z: float, rays: np.ndarray) -> Seen:
+    def meet(self, x: float, z: float, rays: np.ndarray) -> Hit:
         """Look along rays (n, 3) from (x, 0, z)."""
         x, z = x - self.x, z - self.z
         a = rays[:, 0] ** 2 + rays[:, 2] ** 2
@@ -38,7 +38,7 @@ class Cylinder:
         within = (y > self.top) & (y < self.bottom)
         hit, k, y = hit[within], k[within], y[within]
         around = np.arctan2(x + k * rays[hit, 0], z + k * rays[hit, 2]) * self.radius
-        return Seen(hit, _sampled(self.texture, around, y, 1.0), k)
+        return Hit(hit, _sampled(self.texture, around, y, 1.0), k)
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class Wall:
     tile_m: float
     within: tuple[tuple[float, float], tuple[float, float]] = ((-np.inf, np.inf),) * 2
 
-    def meet(self, x: float, z: float, rays: np.ndarray) -> Seen:
+    def meet(self, x: float, z: float, rays: np.ndarray) -> Hit:
         """Look along rays (n, 3) from (x, 0, z)."""
         eye = x, 0.0, z
         with np.errstate(divide='ignore'):
@@ -61,7 +61,7 @@ class Wall:
             value = eye[axis] + k[hit] * rays[hit, axis]
             hit = hit[(value >= low) & (value <= high)]
         one, two = (eye[axis] + k[hit] * rays[hit, axis] for axis in self._others)
-        return Seen(hit, _sampled(self.texture, one, two, self.tile_m), k[hit])
+        return Hit(hit, _sampled(self.texture, one, two, self.tile_m), k[hit])
 
     @property
     def _others(self) -> list[int]:

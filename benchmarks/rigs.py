@@ -15,7 +15,7 @@ SIZES = ((320, 240), (640, 480), (640, 480), (800, 600), (1280, 960))
 
 
 @dataclass(frozen=True)
-class Rig:
+class RandomRig:
     """One pair of frames and the truth about it.
 
     Attributes
@@ -39,7 +39,7 @@ class Rig:
     about: dict = field(default_factory=dict)
 
 
-def random_rig(seed: int, overlaps: bool = True) -> Rig:
+def random_rig(seed: int, overlaps: bool = True) -> RandomRig:
     """Make a rig; without `overlaps` it looks at two worlds, or at two ends of one."""
     rng = np.random.default_rng([seed, overlaps])
     style = STYLES[rng.integers(len(STYLES) - overlaps)]
@@ -68,7 +68,7 @@ def random_rig(seed: int, overlaps: bool = True) -> Rig:
     ]
     offset_deg = yaw_deg + parallax_deg
     seen_deg = np.degrees(lens.max_angle_rad) * 2
-    return Rig(
+    return RandomRig(
         name=f'{style}_{seed}',
         left=frames[0],
         right=frames[1],

@@ -43,7 +43,7 @@ class Shot(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Scene:
+class RoomScene:
     """A room and who crosses it.
 
     Attributes
@@ -62,7 +62,7 @@ class Scene:
     seed: int = 1
 
     def shots(self, count: int = FRAMES) -> Iterator[Shot]:
-        """Give what is seen, moment after moment."""
+        """Yield what is seen, moment after moment."""
         rng = np.random.default_rng([self.seed, round(100 * self.nearest_m)])
         room, step, seen = self._room(rng), 1 / max(1, count - 1), []
         for i in range(count):

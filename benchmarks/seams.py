@@ -15,7 +15,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 from moving_least_squares import MovingLeastSquares
-from rooms import CHROMA, CROSSINGS, FOCAL_PX, OVERLAP_DEG, Scene, Shot
+from rooms import CHROMA, CROSSINGS, FOCAL_PX, OVERLAP_DEG, RoomScene, Shot
 from similarity import similarity_map
 
 from panorama_stitch.compose.blend import Feather, Multiband
@@ -86,7 +86,7 @@ def judge_seams(out: Path) -> int:
 
 
 def missed(feather: SeamQuality, flow: SeamQuality) -> Iterator[str]:
-    """Say what flow misses in a scene."""
+    """List the targets that flow misses in a scene."""
     scene = f'{flow.nearest_m} m, {flow.apart_m} m apart, {flow.crossing or "turning"}'
     gain, seam_gain = flow.overlap_db - feather.overlap_db, flow.seam_db - feather.seam_db
     is_far = flow.nearest_m >= _FAR_M and flow.apart_m <= _CLOSE_M
@@ -111,16 +111,16 @@ def missed(feather: SeamQuality, flow: SeamQuality) -> Iterator[str]:
     return (f'MISSED: {scene}: {what}' for what, is_met in checks.items() if not is_met)
 
 
-def scenes() -> Iterator[Scene]:
-    """Give all rooms: each with each who crosses, and some in which the robot turns."""
+def scenes() -> Iterator[RoomScene]:
+    """Yield all rooms: each with each who crosses, and some in which the robot turns."""
     for nearest_m in NEAREST_M:
         for apart_m in APART_M:
             for crossing in CROSSINGS:
-                yield Scene(nearest_m, apart_m, crossing)
-        yield Scene(nearest_m, 0.15)
+                yield RoomScene(nearest_m, apart_m, crossing)
+        yield RoomScene(nearest_m, 0.15)
 
 
-class Strip:
+class SeamStrip:
     """An overlap, of which a blend is given the columns that it needs."""
 
     def __init__(self, blend: str, height: int, width: int, focal_px: float):
@@ -149,17 +149,19 @@ class Strip:
         return out
 
 
-def judged(scene: Scene, shots: Iterable[Shot], blends: Iterable[str]) -> Iterator[SeamQuality]:
+def judged(
+    scene: RoomScene, shots: Iterable[Shot], blends: Iterable[str]
+) -> Iterator[SeamQuality]:
     """Judge each blend on the shots of a scene."""
     shots = list(shots)
     for blend in blends:
         yield _judge(scene, shots, blend)
 
 
-def _judge(scene: Scene, shots: list[Shot], blend: str) -> SeamQuality:
+def _judge(scene: RoomScene, shots: list[Shot], blend: str) -> SeamQuality:
     height, width = shots[0].midway.shape[:2]
     overlap, seam = (_middle(width, degrees) for degrees in (OVERLAP_DEG, _SEAM_DEG))
-    strip = Strip(blend, height, overlap.stop - overlap.start, FOCAL_PX)
+    strip = SeamStrip(blend, height, overlap.stop - overlap.start, FOCAL_PX)
     errors, alike, shown, ghosts, changes = [], [], [], [], []
     before = None
     for shot in shots:

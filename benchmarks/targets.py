@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Target:
+class Requirement:
     """A number and its limit, the most that it may be or the least."""
 
     what: str

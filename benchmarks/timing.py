@@ -21,7 +21,7 @@ class Spread:
 
 
 def spread(values) -> Spread:
-    """Give the spread of numbers."""
+    """Return the spread of numbers."""
     low, median, high = (float(v) for v in np.percentile(values, (10, 50, 90)))
     return Spread(median, low, high)
 

@@ -7,7 +7,7 @@ import hypothesis
 import pytest
 from field import Field
 
-from fisheye_testing.rig import Rig, unused_domain
+from fisheye_testing.rig import RigProcesses, unused_domain
 from fisheye_testing.watcher import Watcher
 
 DATA = Path(os.environ.get('FISHEYE_DATA', ''))
@@ -15,7 +15,7 @@ DATA = Path(os.environ.get('FISHEYE_DATA', ''))
 
 @pytest.fixture
 def real_rig():
-    """Give the folder of a rig of real pictures by its name."""
+    """Return the folder of a rig of real pictures by its name."""
 
     def folder(name: str) -> Path:
         path = DATA / 'rigs' / name
@@ -31,20 +31,20 @@ def real_rig():
 
 @pytest.fixture
 def domain() -> int:
-    """Give a ROS domain of the test's own."""
+    """Return a ROS domain of the test's own."""
     return unused_domain()
 
 
 @pytest.fixture
 def rig(domain, tmp_path):
-    """Give an empty rig, whose processes end with the test."""
-    with Rig(domain, tmp_path / 'log') as rig:
+    """Return an empty rig, whose processes end with the test."""
+    with RigProcesses(domain, tmp_path / 'log') as rig:
         yield rig
 
 
 @pytest.fixture
 def watcher(domain):
-    """Give a subscriber in the rig's domain."""
+    """Return a subscriber in the rig's domain."""
     with Watcher(domain) as watcher:
         yield watcher
 
@@ -57,7 +57,7 @@ hypothesis.configuration.set_hypothesis_home_dir(
 
 @pytest.fixture(scope='module')
 def five(tmp_path_factory):
-    """Give five nodes on two network cameras, running."""
+    """Run five nodes on two network cameras."""
     with Field(unused_domain(), tmp_path_factory.mktemp('five')) as field:
         field.start_five()
         yield field
@@ -65,7 +65,7 @@ def five(tmp_path_factory):
 
 @pytest.fixture(scope='module')
 def one(tmp_path_factory):
-    """Give the panorama node on two network cameras, running."""
+    """Run the panorama node on two network cameras."""
     with Field(unused_domain(), tmp_path_factory.mktemp('one')) as field:
         field.start_one()
         yield field

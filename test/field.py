@@ -13,7 +13,7 @@ from fisheye_geometry.camera_file import Camera, write_camera
 from fisheye_geometry.remap import Turn
 from fisheye_testing.health import Health
 from fisheye_testing.mjpeg_server import MjpegServer
-from fisheye_testing.rig import SIDES, Rig, wait_for
+from fisheye_testing.rig import SIDES, RigProcesses, wait_for
 
 START_S = 60.0
 """For what happens some time, even where much else runs too."""
@@ -58,11 +58,11 @@ class HttpCameras:
         self.servers[side] = self._serve(side, self.servers[side].port)
 
     def show(self, side: str, picture: bytes | None = None) -> None:
-        """Have a camera that is on send another picture, or its own again."""
+        """Make a running camera send another picture, or its own again."""
         self.servers[side].picture = self.pictures[side] if picture is None else picture
 
     def parameters(self, side: str) -> dict[str, str]:
-        """Give the parameters of a capture node."""
+        """Return the parameters of a capture node."""
         calibration = self._folder / f'{side}.yaml'
         return {'source': self.servers[side].url, 'camera_info_url': str(calibration)}
 
@@ -70,7 +70,7 @@ class HttpCameras:
         return MjpegServer(self.pictures[side], rate_hz=self.RATE_HZ, port=port)
 
 
-class Field(Rig):
+class Field(RigProcesses):
     """Five nodes on two network cameras, as a robot has them.
 
     Attributes
@@ -118,7 +118,7 @@ class Field(Rig):
         self.health.settle()
 
     def endpoints(self, node: str) -> set[bytes]:
-        """Give the identities under which a node reports, now and before it was killed."""
+        """Return the identities under which a node reports, now and before it was killed."""
         namespace, _, name = f'/{node}'.rpartition('/')
         return {
             bytes(end.endpoint_gid)

@@ -50,7 +50,7 @@ def images(draw) -> Image:
 
 
 def _jpeg(width, height):
-    """Give a JPEG whose head claims another size."""
+    """Return a JPEG whose head claims another size."""
     coded = cv2.imencode('.jpg', np.zeros((48, 64, 3), np.uint8))[1].tobytes()
     at = coded.index(b'\xff\xc0') + 5
     return coded[:at] + height.to_bytes(2, 'big') + width.to_bytes(2, 'big') + coded[at + 4 :]

@@ -76,13 +76,13 @@ class Link:
         self._ip('link', 'set', self._device, 'up', prefix=self.robot.prefix)
 
     def readdress(self, end: Namespace) -> None:
-        """Have one of the machines get another address."""
+        """Change the address of one of the machines."""
         former, self._hosts[end] = self._address(end), self._hosts[end] + 10
         self._ip('address', 'delete', former, 'dev', self._device, prefix=end.prefix)
         self._ip('address', 'add', self._address(end), 'dev', self._device, prefix=end.prefix)
 
     def replace(self) -> None:
-        """Take the cable away and lay another one, in another network, as from Wi-Fi to LTE."""
+        """Replace the cable by one in another network, as from Wi-Fi to LTE."""
         self._ip('link', 'delete', self._device, prefix=self.robot.prefix)
         self._network += 1
         self._device = f'link{self._network}'

@@ -10,7 +10,7 @@ import pytest
 from field import RETURN_S, START_S
 from namespaces import Link
 
-from fisheye_testing.rig import SIDES, Rig, wait_for
+from fisheye_testing.rig import SIDES, RigProcesses, wait_for
 
 LONG = bool(os.environ.get('LONG'))
 RATE_HZ = 30.0
@@ -41,7 +41,7 @@ def link(request):
 def rig(domain, tmp_path):
     # Beyond this machine, as the two halves of a real rig need it.
     environment = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET'}
-    with Rig(domain, tmp_path / 'log', environment) as rig:
+    with RigProcesses(domain, tmp_path / 'log', environment) as rig:
         yield rig
 
 
@@ -66,14 +66,14 @@ def listen(rig, end, name, topic, kind):
 
 
 def heard(rig, name):
-    """Give the stamps, ns, and delays, ms, that a listener has printed."""
+    """Return the stamps, ns, and delays, ms, that a listener has printed."""
     lines = rig.log(name + ' heard').read_text().splitlines(keepends=True)
     pairs = [line.split() for line in lines if line.endswith('\n')]
     return [(int(stamp), float(delay)) for stamp, delay in pairs]
 
 
 def came_after(rig, ns):
-    """Give the moments, ns, when panoramas arrived after one."""
+    """Return the moments, ns, when panoramas arrived after one."""
     arrived = [stamp + delay * 1e6 for stamp, delay in heard(rig, 'panorama')]
     return [moment for moment in arrived if moment > ns]
 

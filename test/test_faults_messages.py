@@ -168,7 +168,7 @@ def test_stamps(five, publish):
 
 
 def cv2_picture(field):
-    """Give what the left camera sees."""
+    """Return what the left camera sees."""
     message = CompressedImage(format='jpeg')
     message.data.frombytes(field.cameras.pictures['left'])
     return np.ascontiguousarray(from_jpeg(message)[0])

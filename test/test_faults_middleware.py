@@ -12,7 +12,7 @@ from field import START_S
 from namespaces import Namespace
 
 from fisheye_testing.health import usage
-from fisheye_testing.rig import SEPARATE, SIDES, Rig, wait_for
+from fisheye_testing.rig import SEPARATE, SIDES, RigProcesses, wait_for
 from fisheye_testing.watcher import Watcher
 
 TOOLS = Path(__file__).parents[1] / 'tools'
@@ -30,7 +30,7 @@ def lines(rig, name, pattern):
 
 
 def stamps_ns(rig, name):
-    """Give the stamps of what a subscriber took."""
+    """Return the stamps of what a subscriber took."""
     return [int(stamp) for stamp in lines(rig, name, r'^(\d+) -?[\d.]+$')]
 
 
@@ -41,7 +41,7 @@ def subscribe(rig, name, *options, prefix=()):
 
 
 def recent_rate_hz(rig, name):
-    """Give the rate of the newest pictures by their stamps."""
+    """Return the rate of the newest pictures by their stamps."""
     stamps = stamps_ns(rig, name)
     return sum(stamp > stamps[-1] - WATCHED_S * 1e9 for stamp in stamps) / WATCHED_S
 
@@ -108,7 +108,7 @@ def watched(health):
 
 
 def own_mib(pid):
-    """Give the memory of a process without the segments through which pictures go."""
+    """Return the memory of a process without the segments through which pictures go."""
     used = usage(pid)
     return used.resident_mib - used.shared_mib
 
@@ -142,7 +142,10 @@ def test_a_starved_subscriber_starves_nobody_else(five, how):
 
 def test_two_systems_in_two_domains_do_not_meet(rig, watcher, domain, tmp_path):
     other_domain = domain % 100 + 1
-    with Rig(other_domain, tmp_path / 'other') as other, Watcher(other_domain) as other_watcher:
+    with (
+        RigProcesses(other_domain, tmp_path / 'other') as other,
+        Watcher(other_domain) as other_watcher,
+    ):
         rig.start('panorama', width=320, height=240)
         other.start('panorama', width=480, height=360)
         seen = {}

@@ -12,7 +12,7 @@ from sensor_msgs.msg import Image
 from fisheye_bridge.qos import IMAGE_INPUT
 from fisheye_testing.health import Health
 from fisheye_testing.mjpeg_server import MjpegServer, jpeg
-from fisheye_testing.rig import SIDES, Rig, unused_domain, wait_for
+from fisheye_testing.rig import SIDES, RigProcesses, unused_domain, wait_for
 
 STOP_S = 2.0
 NOBODY = 'http://127.0.0.1:9/stream'
@@ -22,7 +22,7 @@ LARGE = {'width': 1920, 'height': 1440}
 """Pictures of this size keep a calibration busy for seconds."""
 
 
-class Crowd(Rig):
+class Crowd(RigProcesses):
     """Many nodes, each in a state of its own, and a subscriber to what they publish."""
 
     def __init__(self, folder: Path):
@@ -36,7 +36,7 @@ class Crowd(Rig):
         self.health.__exit__()
 
     def listen(self, topic: str) -> None:
-        """Have a topic published."""
+        """Publish a topic."""
         self.health.node.create_subscription(
             Image, topic, lambda _: self.taken.add(topic), IMAGE_INPUT
         )

@@ -11,14 +11,14 @@ from ament_index_python.packages import PackageNotFoundError, get_package_prefix
 from field import START_S
 
 from fisheye_testing.health import Health
-from fisheye_testing.rig import Rig, wait_for
+from fisheye_testing.rig import RigProcesses, wait_for
 
 FILE = Path(__file__).parents[1] / 'src' / 'panorama_stitch' / 'launch' / 'panorama.launch.py'
 CAPTURES = ('left/capture', 'right/capture')
 OK = b'\0'
 
 
-class Launched(Rig):
+class Launched(RigProcesses):
     """A process that launches, and what its nodes say."""
 
     def __init__(self, domain, folder, is_real):

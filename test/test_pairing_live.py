@@ -20,7 +20,7 @@ from fisheye_bridge.projection import projection_of
 from fisheye_bridge.qos import IMAGE_INPUT, LATCHED
 from fisheye_bridge.stamps import stamp_of
 from fisheye_geometry.surface import Surface
-from fisheye_testing.free_running import Camera
+from fisheye_testing.free_running import CameraTiming
 from fisheye_testing.rig import SIDES, wait_for
 
 WATCHED_S = 8.0
@@ -85,7 +85,10 @@ class Publisher:
     ('rates_hz', 'phase'), [((30, 30), 0.5), ((30, 29.83), 0.0), ((30, 25), 0.3)]
 )
 def test_the_slower_camera_sets_the_rate(rig, watcher, rates_hz, phase):
-    cameras = Camera(rates_hz[0], 0.0, 1.0), Camera(rates_hz[1], phase * 1000 / 30, 1.0)
+    cameras = (
+        CameraTiming(rates_hz[0], 0.0, 1.0),
+        CameraTiming(rates_hz[1], phase * 1000 / 30, 1.0),
+    )
     rig.start('stitch', auto_calibrate=False, stale_after_s=5.0)
     with Publisher(watcher.node, cameras).running() as publisher:
         wait_for(lambda: rig.check_alive() or watcher.newest, START_S, 'a first panorama')
@@ -113,7 +116,7 @@ def test_clocks_that_differ_are_told_with_the_remedy_which_works(rig, watcher):
     )
     client = watcher.node.create_client(SetParameters, 'stitch/set_parameters')
     rig.start('stitch', auto_calibrate=False)
-    cameras = Camera(30, 0.0, 1.0), Camera(30, 12.0, 1.0)
+    cameras = CameraTiming(30, 0.0, 1.0), CameraTiming(30, 12.0, 1.0)
 
     def says(words):
         return rig.check_alive() or any(words in status.message for status in told[-1:])

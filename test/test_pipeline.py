@@ -28,12 +28,12 @@ def start(rig, watcher, *, composed=False, folder=None, **capture):
 
 
 def is_measured(watcher):
-    """Tell whether the overlap was looked for; a camera that is alone for a while is shown too."""
+    """Return whether the overlap was looked for; a lone camera is shown for a while too."""
     return watcher.overlaps and all(overlap.method for overlap in watcher.overlaps.overlaps)
 
 
 def captured_stamps(watcher):
-    """Give the set that fills with the stamps that both cameras took."""
+    """Return the set that fills with the stamps that both cameras took."""
     seen, both = {'left': set(), 'right': set()}, set()
 
     def take(side, message):

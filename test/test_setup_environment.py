@@ -72,7 +72,7 @@ def test_missing_compiler_names_its_package(fit_machine, tmp_path):
 
 @pytest.fixture
 def sourced_ros(monkeypatch, tmp_path):
-    """Give a ROS with rclpy and colcon, beside which these requirements are looked for."""
+    """Return a ROS with rclpy and colcon, beside which these requirements are looked for."""
     (tmp_path / 'share' / 'rclpy').mkdir(parents=True)
     colcon = tmp_path / 'colcon'
     colcon.write_text('')

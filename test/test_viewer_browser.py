@@ -79,7 +79,7 @@ class Page:
         ActionChains(self.driver).send_keys(keys).perform()
 
     def shot(self, name):
-        """Give the pixels (height, width, 3) of an element."""
+        """Return the pixels (height, width, 3) of an element."""
         coded = np.frombuffer(self.find(name).screenshot_as_png, np.uint8)
         return cv2.imdecode(coded, cv2.IMREAD_COLOR)
 
@@ -98,7 +98,7 @@ class Page:
 
 @pytest.fixture
 def serve():
-    """Give a function that shows one picture over and over, until `stop` is called."""
+    """Return a function that shows one picture over and over, until `stop` is called."""
     ended, faults = [], []
 
     def start(surface, image, **settings):
@@ -138,7 +138,7 @@ def serve():
 
 @pytest.fixture
 def attackers():
-    """Give a function that attacks a port from another address until the test ends."""
+    """Return a function that attacks a port from another address until the test ends."""
     processes = []
 
     def run(kind, port):
@@ -266,7 +266,7 @@ def test_a_phone_starts_by_looking_around(browser, serve):
 
 
 def elsewhere(server):
-    """Give the address of a page for other machines as this one reaches it, and the token."""
+    """Return the address of a page for other machines as this one reaches it, and the token."""
     url, _, token = server.url.partition('#token=')
     return f'http://127.0.0.1:{url.rpartition(":")[2]}', token
 

@@ -16,7 +16,7 @@ from fisheye_capture.capture_settings import CaptureSettings
 from fisheye_capture.synthetic import synthetic_lens
 from fisheye_core.errors import FisheyeError, OverlapError
 from fisheye_geometry.camera_file import read_camera
-from fisheye_testing.rig import SIDES, Rig, camera_parameters, unused_domain, wait_for
+from fisheye_testing.rig import SIDES, RigProcesses, camera_parameters, unused_domain, wait_for
 from fisheye_testing.watcher import Watcher
 from fisheye_undistort.correction import Correction
 from fisheye_undistort.undistort_settings import UndistortSettings
@@ -33,7 +33,7 @@ def main() -> int:
     out.mkdir(parents=True, exist_ok=True)
     for former in (out / 'log').glob('*.log'):
         former.unlink()
-    with Rig(domain, out / 'log') as rig:
+    with RigProcesses(domain, out / 'log') as rig:
         what = arguments.rig or 'the synthetic rig'
         nodes = 'one node' if arguments.composed else 'five nodes'
         print(f'Starting {nodes} on {what} in ROS_DOMAIN_ID={domain} ...', flush=True)
@@ -52,7 +52,7 @@ def main() -> int:
     return 0
 
 
-def view(rig: Rig, host: str) -> None:
+def view(rig: RigProcesses, host: str) -> None:
     """Show the panorama in browsers until Ctrl-C."""
     rig.start('viewer', host=host)
     address = wait_for(
@@ -69,7 +69,9 @@ def view(rig: Rig, host: str) -> None:
         print()
 
 
-def demonstrate(rig: Rig, watcher: Watcher, begin: float, arguments: argparse.Namespace) -> None:
+def demonstrate(
+    rig: RigProcesses, watcher: Watcher, begin: float, arguments: argparse.Namespace
+) -> None:
     """Measure and save what the rig gives; `begin` is when it was started."""
     wait_for(lambda: rig.check_alive() or watcher.newest, START_TIMEOUT_S, 'a first panorama')
     print(f'First panorama after {time.monotonic() - begin:.1f} s.', flush=True)
@@ -141,7 +143,7 @@ def parse() -> argparse.Namespace:
     return arguments
 
 
-def watch(watcher: Watcher, rig: Rig, seconds: float) -> None:
+def watch(watcher: Watcher, rig: RigProcesses, seconds: float) -> None:
     """Count panoramas for a while, two at least, with a line that shows that they come."""
     watcher.restart()
     end = time.monotonic() + seconds
@@ -181,7 +183,7 @@ def report(watcher: Watcher, answer, arguments: argparse.Namespace) -> None:
 
 
 def true_offset_deg(folder: Path | None) -> float | None:
-    """Give the offset that is known of a rig, deg; None where none is."""
+    """Return the offset that is known of a rig, deg; None where none is."""
     if folder is None:
         return SYNTHETIC_OFFSET_DEG
     path = folder / 'truth.json'

@@ -35,7 +35,7 @@ def _text(default) -> str:
 
 
 def updated(page: str) -> str:
-    """Give a page with its tables as they should be."""
+    """Return a page with its tables as they should be."""
     return _TABLE.sub(lambda found: found[1] + table(found[2]) + found[3], page)
 
 

@@ -97,7 +97,7 @@ def missing_beside_ros():
 
 
 def install(requirements):
-    """Have pip install into `.venv`, and say how far it is."""
+    """Install into `.venv` with pip, and print the progress."""
     say('Installing Python packages, which takes a minute or more the first time')
     command = [VENV / 'bin' / 'python', '-m', 'pip', 'install', '--no-cache-dir', *requirements]
     command += ['--prefer-binary', '--use-pep517']  # empy has no wheel

@@ -9,7 +9,7 @@ from fisheye_core.errors import FisheyeError
 
 
 def awaitable(future: concurrent.futures.Future, *, within_s: float | None = None) -> Future:
-    """Return a future of a thread as one that a callback of rclpy can await.
+    """Wrap a future of a thread as one that a callback of rclpy can await.
 
     Where the thread ended before it began the work, or the work takes longer than `within_s`, the
     callback gets a `FisheyeError`.

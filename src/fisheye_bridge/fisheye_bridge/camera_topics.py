@@ -88,7 +88,7 @@ class CameraSubscription:
         return self._seen.lens if self._seen else None
 
     def refuse(self, error: FisheyeError) -> None:
-        """Say that a lens cannot be used."""
+        """Report that a lens cannot be used."""
         self._refusal, self._is_over = str(error), False
         kept = '; the last good calibration stays in use' if self._seen else ''
         self._node.get_logger().warning(
@@ -97,7 +97,7 @@ class CameraSubscription:
         )
 
     def report(self, report: Report, *, is_used: bool) -> None:
-        """Say what is wrong; a refusal once more after the camera_info in use came again.
+        """Report what is wrong; a refusal once more after the camera_info in use came again.
 
         Parameters
         ----------
@@ -131,8 +131,8 @@ class CameraSubscription:
         if content == self._content:
             self._is_over = True
             self._settling.calm()
-            if self._picture_size is None:
-                self._tell()
+            if self._picture_size is None and self._seen:
+                self._tell(self._seen.lens)
             return
         if content == self._refused and monotonic() < self._again_s:
             return
@@ -158,15 +158,16 @@ class CameraSubscription:
 
     def _take_picture(self, image: np.ndarray, encoding: str, header: Header) -> None:
         self._picture_size = image.shape[1::-1]
-        if self._seen and self._seen.look(image):
-            self._tell()
-        if self._seen and self._seen.note and not self._note:
-            self._note = f'{self._prefix}camera_info: {self._seen.note}'
+        seen = self._seen
+        if seen and seen.look(image):
+            self._tell(seen.lens)
+        if seen and seen.note and not self._note:
+            self._note = f'{self._prefix}camera_info: {seen.note}'
             self._node.get_logger().warning(self._note)
         self._on_picture(image, encoding, header)
 
-    def _tell(self) -> None:
+    def _tell(self, lens: Lens) -> None:
         try:
-            self._on_lens(self.lens, self._header)
+            self._on_lens(lens, self._header)
         except FisheyeError as error:
             self.refuse(error)

@@ -12,7 +12,7 @@ from fisheye_core.settings import Rule, describe_range, rules
 
 
 def own_words() -> list[str]:
-    """Give the words that are not for ROS.
+    """Return the arguments that are not for ROS.
 
     Raises
     ------

@@ -58,7 +58,7 @@ _COMPRESSED_COLOR = re.compile(r'compressed (rgb|bgr)')
 
 
 def to_array(message: Image) -> tuple[np.ndarray, str]:
-    """Give the pixels of a message.
+    """Return the pixels of a message.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def to_array(message: Image) -> tuple[np.ndarray, str]:
     shape = (height, width) if form.channels == 1 else (height, width, form.channels)
     strides = (step, form.depth) if form.channels == 1 else (step, form.channels, 1)
     upper = 0 if message.is_bigendian else form.depth - 1
-    pixels = np.ndarray(shape, np.uint8, message.data, upper, strides)
+    pixels: np.ndarray = np.ndarray(shape, np.uint8, message.data, upper, strides)
     if form.depth > 1:
         pixels = np.ascontiguousarray(pixels)
     if form.conversion is not None:
@@ -160,11 +160,11 @@ def to_jpeg(image: np.ndarray, encoding: str, header: Header, quality: int) -> C
 
 
 def jpeg_message(coded: np.ndarray, encoding: str, header: Header) -> CompressedImage:
-    """Give the same for a picture that is a JPEG already, (n,) uint8."""
+    """Build the same message from a JPEG, (n,) uint8."""
     stored = '' if encoding == 'mono8' else 'bgr8'
     message = CompressedImage(header=header, format=f'{encoding}; jpeg compressed {stored}')
     data = array('B')
-    data.frombytes(memoryview(coded).cast('B'))
+    data.frombytes(coded.data.cast('B'))
     message.data = data
     return message
 

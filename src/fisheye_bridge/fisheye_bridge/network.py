@@ -122,7 +122,7 @@ def refresher(node: Node) -> Callable[[], bool]:
 
 
 def forget_machine() -> None:
-    """Have Fast DDS find out anew which machine it is on; to be called while no context is up."""
+    """Reset what Fast DDS knows of this machine; to be called while no context is up."""
     with suppress(OSError, ValueError):
         # The guard of the static variable in eprosima::Host::instance().
         ctypes.c_int64.in_dll(ctypes.CDLL('librmw_fastrtps_cpp.so'), _HOST_GUARD).value = 0

@@ -122,7 +122,7 @@ def _typed(name: str, value: Any) -> Parameter:
 
 
 def _retyped(parameter: Parameter, groups: list[Parameters]) -> Parameter:
-    """Give a parameter its setting's type: what is asked for later has the type of the default."""
+    """Pin a parameter to its setting's type: later values must have the type of the default."""
     for group in groups:
         with suppress(FisheyeError):  # refused with its sentence later on
             if typed := group.typed(parameter):
@@ -131,7 +131,7 @@ def _retyped(parameter: Parameter, groups: list[Parameters]) -> Parameter:
 
 
 def misspelt(node: Node) -> str:
-    """Say which parameters a node was given that it does not have, '' if there are none."""
+    """Name the parameters that a node was given but does not have; '' if there are none."""
     declared = list(node.get_parameters_by_prefix(''))
     complaints = []
     # rclpy keeps what was given to itself.

@@ -7,7 +7,7 @@ from fisheye_geometry.surface import Surface
 
 
 def surface_of(message: Projection) -> Surface:
-    """Give the surface that a message describes; a `GeometryError` if there is no such surface."""
+    """Return the surface that a message describes; a `GeometryError` if there is none such."""
     return Surface(
         kind=message.surface,
         width=message.width,

@@ -151,7 +151,7 @@ def _logger(node_class: type[Node]):
 
 @contextmanager
 def started(node_class: type[_Node], *arguments: Any) -> Iterator[_Node]:
-    """Give a node to a command, which spins it itself and is ended by a KeyboardInterrupt.
+    """Lend a node to a command, which spins it itself and is ended by a KeyboardInterrupt.
 
     Parameters
     ----------

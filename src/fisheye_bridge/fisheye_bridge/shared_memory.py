@@ -48,7 +48,7 @@ def prepare(folder: Path = FOLDER) -> str:
 
 
 def _room(folder: Path) -> int:
-    """Give how many bytes can still be taken; 0 where nothing can be written."""
+    """Return how many bytes can still be taken; 0 where nothing can be written."""
     try:
         state = os.statvfs(folder)
     except OSError:

@@ -6,11 +6,11 @@ _NS_PER_S = 1_000_000_000
 
 
 def ns_of(stamp: Time) -> int:
-    """Give a stamp in nanoseconds."""
+    """Convert a stamp to nanoseconds."""
     return stamp.sec * _NS_PER_S + stamp.nanosec
 
 
 def stamp_of(stamp_ns: int) -> Time:
-    """Give nanoseconds as a stamp."""
+    """Convert nanoseconds to a stamp."""
     seconds, nanoseconds = divmod(stamp_ns, _NS_PER_S)
     return Time(sec=seconds, nanosec=nanoseconds)

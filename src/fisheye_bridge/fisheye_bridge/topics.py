@@ -15,7 +15,7 @@ from fisheye_bridge.qos import ADJUSTABLE, BEST_EFFORT_INPUT, IMAGE, IMAGE_INPUT
 from fisheye_core.errors import FisheyeError
 
 
-class Picture(Protocol):
+class CameraPicture(Protocol):
     """What a camera gives."""
 
     size: tuple[int, int]
@@ -47,7 +47,7 @@ class ImagePublisher:
             self._jpeg.publish(to_jpeg(image, message.encoding, message.header, jpeg_quality))
 
     def publish_picture(
-        self, picture: Picture, encoding: str, header: Header, jpeg_quality: int
+        self, picture: CameraPicture, encoding: str, header: Header, jpeg_quality: int
     ) -> None:
         """Publish a camera's picture, its JPEG as it is where the camera gave one.
 
@@ -123,7 +123,7 @@ class ImageSubscription:
         )
 
     def _make_do(self, event) -> None:
-        """Take what is published best effort as it is: better some pictures than none."""
+        """Accept best-effort publishers: some images are better than none."""
         self._node.get_logger().warning(
             f'{self._topic} is published best effort: some pictures may be lost'
         )

@@ -13,7 +13,7 @@ from fisheye_core.errors import FisheyeError, OverlapError
 
 @pytest.fixture
 def answer():
-    """Give what a coroutine makes of a future that waits when the coroutine begins."""
+    """Return what a coroutine makes of a future that waits when the coroutine begins."""
     context = rclpy.Context()
     rclpy.init(context=context)
     executor = SingleThreadedExecutor(context=context)

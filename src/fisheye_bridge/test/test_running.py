@@ -23,7 +23,7 @@ class Counter(Node):
 
 @pytest.fixture
 def prepared(monkeypatch):
-    """Give the list of whether ROS was up when the shared memory was prepared."""
+    """Return the list of whether ROS was up when the shared memory was prepared."""
     seen = []
 
     def prepare():

@@ -3,6 +3,7 @@
 import os
 import stat
 import time
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -72,7 +73,7 @@ class DeviceSource(Source):
             raise SourceLostError(f'there is no device {path}')
         if not os.access(path, os.R_OK | os.W_OK):
             raise SourceLostError(f'{path} may not be opened; is the user in the group video?')
-        device = os.stat(path)
+        device = Path(path).stat()
         if stat.S_ISCHR(device.st_mode) and os.major(device.st_rdev) != _VIDEO4LINUX:
             raise SourceError(f'{path} is no camera; expected a Video4Linux device')
         capture = cv2.VideoCapture(path, cv2.CAP_V4L2)

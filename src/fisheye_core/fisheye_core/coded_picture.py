@@ -19,7 +19,7 @@ _NO_FRAMES = 0xC4, 0xC8, 0xCC
 
 
 def size_of(coded: np.ndarray) -> tuple[int, int]:
-    """Give the width and height, px, that a JPEG or PNG claims to have.
+    """Return the width and height, px, that a JPEG or PNG claims to have.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def size_of(coded: np.ndarray) -> tuple[int, int]:
     ----------
     ITU-T T.81, annex B, and ISO/IEC 15948, section 11.2.2.
     """
-    data = memoryview(coded)
+    data = coded.data
     if bytes(data[:8]) == _PNG and len(data) >= 24:
         return _number(data[16:20]), _number(data[20:24])
     if bytes(data[:2]) == _JPEG:
@@ -104,7 +104,7 @@ def pixels_of(coded: np.ndarray, *, grey: bool = False) -> np.ndarray:
     """
     _check_claim(coded)
     kind = cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR
-    image = None
+    image: np.ndarray | None = None
     if coded.size:
         with without_libjpeg_lines(), suppress(cv2.error):
             image = cv2.imdecode(coded, kind | cv2.IMREAD_IGNORE_ORIENTATION)
@@ -113,7 +113,7 @@ def pixels_of(coded: np.ndarray, *, grey: bool = False) -> np.ndarray:
     return image
 
 
-def _check_claim(coded):
+def _check_claim(coded: np.ndarray) -> None:
     """Refuse a JPEG or PNG whose head claims a size that no camera has."""
     try:
         width, height = size_of(coded)
@@ -125,5 +125,5 @@ def _check_claim(coded):
         )
 
 
-def _number(data: memoryview) -> int:
+def _number(data: bytes | memoryview) -> int:
     return int.from_bytes(data, 'big')

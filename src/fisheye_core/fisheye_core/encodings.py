@@ -19,7 +19,7 @@ _CHANGES = {
 
 
 def converted(image: np.ndarray, encoding: str, wanted: str) -> np.ndarray:
-    """Give a picture in another encoding.
+    """Convert an image to another encoding.
 
     Parameters
     ----------
@@ -50,10 +50,10 @@ def alike(images: Sequence[np.ndarray]) -> list[np.ndarray]:
 
 
 def from_opencv(image: np.ndarray, wanted: str) -> np.ndarray:
-    """Give a picture of OpenCV's, (height, width[, 3]) grey or BGR, in an encoding."""
+    """Convert OpenCV's grey or BGR image (height, width[, 3]) to an encoding."""
     return converted(image, 'mono8' if image.ndim == 2 else 'bgr8', wanted)
 
 
 def to_opencv(image: np.ndarray, encoding: str) -> np.ndarray:
-    """Give a picture in an encoding as OpenCV takes it: (height, width[, 3]) grey or BGR."""
+    """Convert an image in an encoding to what OpenCV takes: (height, width[, 3]) grey or BGR."""
     return converted(image, encoding, 'mono8' if encoding == 'mono8' else 'bgr8')

@@ -43,7 +43,7 @@ class LatestOnlyQueue(Generic[_Item]):
             self._waiting.clear()
 
     def close(self) -> None:
-        """Have each `get`, now and later, return None."""
+        """Make each `get`, now and later, return None."""
         with self._changed:
             self._is_closed = True
             self._changed.notify_all()
@@ -65,7 +65,7 @@ class LatestOnlyWorker(Generic[_Item]):
         return self._queue.dropped
 
     def put(self, item: _Item) -> None:
-        """Have an item worked on, in place of the oldest where too many wait."""
+        """Queue an item, in place of the oldest where too many wait."""
         self._queue.put(item)
 
     def stop(self) -> None:

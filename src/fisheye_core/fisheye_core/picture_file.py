@@ -24,7 +24,7 @@ def is_picture(path: str | Path) -> bool:
 
 
 def pictures_in(name: str | Path, suffixes: Collection[str] = SUFFIXES) -> list[Path]:
-    """Give the pictures in a folder, or those that a glob matches.
+    """Return the pictures in a folder, or those that a glob matches.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def pictures_in(name: str | Path, suffixes: Collection[str] = SUFFIXES) -> list[
         If there is something, but none of it is a picture.
     """
     is_folder = os.path.isdir(name)
-    pattern = os.path.join(escape(str(name)), '*') if is_folder else str(name)
+    pattern = str(Path(escape(str(name)), '*')) if is_folder else str(name)
     paths = [Path(path) for path in sorted(glob(pattern, recursive=True))]
     pictures = [path for path in paths if path.suffix.lower() in suffixes]
     if not pictures and (paths or is_folder):
@@ -80,7 +80,7 @@ def read_picture(path: str | Path, *, grey: bool = False) -> np.ndarray:
         raise SourceError(f'{path} is not a picture that can be read: {error}') from error
 
 
-def _content(path):
+def _content(path: str | Path) -> bytes:
     """Read a regular file of a size that a picture can have; a FIFO or device never ends."""
     # Without O_NONBLOCK, opening a FIFO waits for somebody who writes.
     file = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)

@@ -37,7 +37,7 @@ class Mapping(dict):
         Values that are no lists or mappings, as they were written.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__()
         self.lines: dict[str, int] = {}
         self.texts: dict[str, str] = {}
@@ -80,7 +80,7 @@ class _Events(yaml.reader.Reader, yaml.scanner.Scanner, yaml.parser.Parser):
         yaml.scanner.Scanner.__init__(self)
         yaml.parser.Parser.__init__(self)
 
-    def scan_to_next_token(self):
+    def scan_to_next_token(self) -> None:
         """Skip white space, tabs too but where they would indent."""
         super().scan_to_next_token()
         while self.peek() == '\t':
@@ -118,7 +118,7 @@ class _Builder:
             raise FileContentError(f'it holds {kind}; expected `key: value` lines')
         return value
 
-    def _value(self, event, depth: int):
+    def _value(self, event: Any, depth: int) -> Any:
         line = event.start_mark.line + 1
         before = self._size
         self._count(1, line)
@@ -173,13 +173,13 @@ class _Builder:
             raise FileContentError(f'line {line}: aliases repeat too much; expected plain values')
 
 
-def _refuse_tag(event) -> None:
+def _refuse_tag(event: Any) -> None:
     if event.tag not in (None, _IGNORED_TAG):
         tag, line = event.tag.replace('tag:yaml.org,2002:', '!!'), event.start_mark.line + 1
         raise FileContentError(f'line {line}: it has the tag {tag!r:.60}; expected plain values')
 
 
-def _scalar(text: str):
+def _scalar(text: str) -> Any:
     """Resolve what stands without quotes: a word, a number, or else the text itself."""
     if text in _WORDS:
         return _WORDS[text]

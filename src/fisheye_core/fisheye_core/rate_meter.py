@@ -10,7 +10,7 @@ _TIMES = 60
 class RateMeter:
     """Counts events a second, of late."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._times_s: deque[float] = deque(maxlen=_TIMES)
 
     def count(self) -> None:

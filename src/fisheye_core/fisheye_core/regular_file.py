@@ -76,7 +76,7 @@ def replace_regular(path: str | Path, text: str) -> None:
             file.flush()
             os.fsync(file.fileno())
             os.fchmod(file.fileno(), 0o644)
-            os.replace(temporary, path)
+            Path(temporary).replace(path)
     except OSError:
         Path(temporary).unlink(missing_ok=True)
         raise

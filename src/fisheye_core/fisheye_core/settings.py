@@ -28,7 +28,7 @@ class Rule:
     """Whether a list may have nothing in it."""
 
 
-def setting(default: Any, help: str, **rule) -> Any:
+def setting(default: Any, help: str, **rule: Any) -> Any:
     """Declare a field of a settings dataclass; `rule` as in `Rule`."""
     if isinstance(default, list):
         raise TypeError('a default must not be mutable: use a tuple')
@@ -36,7 +36,7 @@ def setting(default: Any, help: str, **rule) -> Any:
 
 
 def rules(settings: type) -> dict[str, tuple[type, Any, Rule]]:
-    """Give type, default and rule of each setting of a dataclass, in order."""
+    """Return type, default and rule of each setting of a dataclass, in order."""
     types = get_type_hints(settings)
     return {
         entry.name: (types[entry.name], entry.default, entry.metadata['rule'])
@@ -91,7 +91,7 @@ def _within(name: str, value: float, rule: Rule) -> float:
 
 
 def describe_range(rule: Rule) -> str:
-    """Say in words which values a rule allows, '' for any."""
+    """Describe the values that a rule allows; '' for any."""
     nan = ' or NaN' if rule.nan else ''
     if rule.choices:
         return 'one of ' + ', '.join(rule.choices)

@@ -41,7 +41,7 @@ def test_a_link_stays_and_its_file_is_replaced(tmp_path):
         write_mapping(link, {'a': number})
         assert link.is_symlink()
         assert read_mapping(link) == read_mapping(target) == {'a': number}
-    assert os.listdir(tmp_path / 'there') == ['a.yaml']
+    assert list(target.parent.iterdir()) == [target]
 
 
 def test_a_link_in_a_circle_is_refused(tmp_path):
@@ -77,10 +77,10 @@ def test_what_killed_writers_left_is_gone_after_the_next(tmp_path):
     replace_regular(path, 'old')
     writers = [writer(path, 'killed') for _ in range(3)]
     assert [process.wait(60) for process in writers] == [-signal.SIGKILL] * 3
-    assert len(os.listdir(tmp_path)) > 2
+    assert len(list(tmp_path.iterdir())) > 2
     assert path.read_text() == 'old'
     replace_regular(path, 'new')
-    assert sorted(os.listdir(tmp_path)) == [other.name, path.name]
+    assert sorted(tmp_path.iterdir()) == [other, path]
 
 
 def test_writers_beside_each_other_leave_one_whole_file(tmp_path):
@@ -90,4 +90,4 @@ def test_writers_beside_each_other_leave_one_whole_file(tmp_path):
         if path.exists():
             assert path.read_text() == 'whole\n' * 1000
     assert [process.wait() for process in writers] == [0, 0]
-    assert os.listdir(tmp_path) == ['a.yaml']
+    assert list(tmp_path.iterdir()) == [path]

@@ -33,7 +33,7 @@ class AnnularLens(Lens):
     coefficient_counts = (4,)
     has_image_circle = False
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         super().__post_init__()
         inner, first, last, direction = self.distortion
         if not 0 < inner < 1:
@@ -77,7 +77,7 @@ class AnnularLens(Lens):
         seen = (elevation >= lowest - _ROUNDING_RAD) & (elevation <= highest + _ROUNDING_RAD)
         return pixels, seen
 
-    def _distort(self, rays):
+    def _distort(self, rays: np.ndarray) -> np.ndarray:
         x, y, z = np.moveaxis(rays, -1, 0)
         inner, first, last, direction = self.distortion
         share = (np.arctan2(-y, np.hypot(x, z)) - first) / (last - first)
@@ -85,7 +85,7 @@ class AnnularLens(Lens):
         bearing = direction * np.arctan2(x, z)
         return np.stack([radius * np.sin(bearing), -radius * np.cos(bearing)], axis=-1)
 
-    def _undistort(self, normalized):
+    def _undistort(self, normalized: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         u, v = np.moveaxis(normalized, -1, 0)
         inner, first, last, direction = self.distortion
         share = (np.hypot(u, v) - inner) / (1 - inner)

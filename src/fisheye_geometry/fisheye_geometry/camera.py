@@ -1,6 +1,7 @@
 """A calibrated camera, and which part of its sensor the pictures show."""
 
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -42,7 +43,7 @@ class Camera:
     rectification: tuple[float, ...] = IDENTITY
     projection: tuple[float, ...] = ()
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name, values in (('R', self.rectification), ('P', self.projection)):
             for value in values:
                 if not abs(value) <= sys.float_info.max:
@@ -50,7 +51,7 @@ class Camera:
         _check_plausible(self.lens)
 
     def size_mismatch(self, width: int, height: int) -> str:
-        """Say why pictures of a size, px, cannot be of this camera; '' if they can."""
+        """Explain why images of a size, px, cannot come from this camera; '' if they can."""
         if (self.lens.width, self.lens.height) == (width, height):
             return ''
         return (
@@ -97,7 +98,9 @@ def _check_plausible(lens: Lens) -> None:
         )
 
 
-def camera_from(name: str, lens: Lens, rectification, projection) -> Camera:
+def camera_from(
+    name: str, lens: Lens, rectification: Sequence[float], projection: Sequence[float]
+) -> Camera:
     """Return a camera of R and P as camera_info has them, where zeros mean that none is given."""
     return Camera(
         name,

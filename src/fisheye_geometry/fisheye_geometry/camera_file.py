@@ -4,7 +4,9 @@ Beside the file that camera_calibration writes and `camera_info_url` names: its 
 of camera_info as `ros2 topic echo` prints it, and OpenCV's FileStorage with the keys of ROS.
 """
 
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 from fisheye_core.errors import (
     CalibrationError,
@@ -82,7 +84,7 @@ def write_camera(path: str | Path, camera: Camera) -> None:
     )
 
 
-def _matrix(rows: int, cols: int, data) -> dict:
+def _matrix(rows: int, cols: int, data: Iterable[float]) -> dict[str, Any]:
     return {'rows': rows, 'cols': cols, 'data': [float(value) for value in data]}
 
 
@@ -90,10 +92,10 @@ def _camera(entries: Mapping) -> Camera:
     _refuse_kalibr(entries)
     if 'image_width' not in entries and 'width' in entries:
         entries = _of_message(entries)
-    size = [_integer(entries, key) for key in ('image_width', 'image_height')]
+    width, height = _integer(entries, 'image_width'), _integer(entries, 'image_height')
     matrix = _numbers(entries, 'camera_matrix', {9})
     distortion = _numbers(entries, 'distortion_coefficients', _COEFFICIENTS)
-    lens = make_lens(_model(entries), *size, matrix, distortion)
+    lens = make_lens(_model(entries), width, height, matrix, distortion)
     rectification = _numbers(entries, 'rectification_matrix', {9}, IDENTITY)
     projection = _numbers(entries, 'projection_matrix', {12}, ())
     camera = camera_from(_text(entries, 'camera_name'), lens, rectification, projection)
@@ -139,7 +141,7 @@ def _count(entries: Mapping, key: str) -> int:
 
 
 def _integer(entries: Mapping, key: str) -> int:
-    value = entries.get(key)
+    value: Any = entries.get(key)
     if not is_number(value) or value != int(value):
         raise CameraFileError(
             f'{entries.at(key)}{key} is {shown(value)}; expected a whole number of pixels'
@@ -166,8 +168,10 @@ def _text(entries: Mapping, key: str) -> str:
     return entries.texts.get(key, '')
 
 
-def _numbers(entries: Mapping, key: str, counts: set[int], default=None) -> tuple[float, ...]:
-    """Take `data` of a matrix entry, whose length must be one of `counts`."""
+def _numbers(
+    entries: Mapping, key: str, counts: set[int], default: tuple[float, ...] | None = None
+) -> tuple[float, ...]:
+    """Read `data` of a matrix entry, whose length must be one of `counts`."""
     if key not in entries and default is not None:
         return default
     entry, name = entries.get(key), entries.at(key) + key

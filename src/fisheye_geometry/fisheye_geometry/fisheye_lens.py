@@ -2,10 +2,13 @@
 
 from functools import cached_property
 from math import pi
+from typing import TypeVar
 
 import numpy as np
 
 from fisheye_geometry.lens_model import Lens
+
+_Angle = TypeVar('_Angle', float, np.ndarray)
 
 
 class FisheyeLens(Lens):
@@ -31,24 +34,24 @@ class FisheyeLens(Lens):
         turning = [np.sqrt(s.real) for s in squares if s.real > 0 and abs(s.imag) < 1e-9]
         return float(min([pi, self.visible_angle_rad, *turning]))
 
-    def _radius(self, angle):
+    def _radius(self, angle: _Angle) -> _Angle:
         k1, k2, k3, k4 = self.distortion
         square = angle * angle
         return angle * (1 + square * (k1 + square * (k2 + square * (k3 + square * k4))))
 
-    def _slope(self, angle):
+    def _slope(self, angle: np.ndarray) -> np.ndarray:
         k1, k2, k3, k4 = self.distortion
         square = angle * angle
         return 1 + square * (3 * k1 + square * (5 * k2 + square * (7 * k3 + square * 9 * k4)))
 
-    def _distort(self, rays):
+    def _distort(self, rays: np.ndarray) -> np.ndarray:
         x, y, z = np.moveaxis(rays, -1, 0)
         side = np.hypot(x, y)
         radius = self._radius(np.arctan2(side, z))
         scale = np.divide(radius, side, out=np.zeros_like(side), where=side > 0)
         return np.stack([x * scale, y * scale], axis=-1)
 
-    def _undistort(self, normalized):
+    def _undistort(self, normalized: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         u, v = np.moveaxis(normalized, -1, 0)
         radius = np.hypot(u, v)
         # Rays at the very edge come back with a rounding error that must not hide them.
@@ -57,7 +60,7 @@ class FisheyeLens(Lens):
         scale = np.divide(np.sin(angle), radius, out=np.ones_like(radius), where=radius > 0)
         return np.stack([u * scale, v * scale, np.cos(angle)], axis=-1), seen
 
-    def _angle(self, radius):
+    def _angle(self, radius: np.ndarray) -> np.ndarray:
         """Invert `_radius`: a table gives the start, Newton's method the rest."""
         table = np.linspace(0.0, self.max_angle_rad, 4096)
         angle = np.interp(radius, self._radius(table), table)

@@ -1,6 +1,9 @@
 """Lenses by the names that ROS gives their models."""
 
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import ArrayLike
 
 from fisheye_core.errors import CalibrationError
 from fisheye_geometry.annular_lens import AnnularLens
@@ -10,7 +13,7 @@ from fisheye_geometry.pinhole_lens import PinholeLens
 
 __all__ = ['MAX_PICTURE_SIDE_PX', 'AnnularLens', 'FisheyeLens', 'Lens', 'PinholeLens', 'make_lens']
 
-_MODELS = {
+_MODELS: dict[str, type[Lens]] = {
     'equidistant': FisheyeLens,
     'fisheye': FisheyeLens,
     'plumb_bob': PinholeLens,
@@ -19,7 +22,13 @@ _MODELS = {
 }
 
 
-def make_lens(model: str, width: int, height: int, matrix, distortion) -> Lens:
+def make_lens(
+    model: str,
+    width: int,
+    height: int,
+    matrix: ArrayLike,
+    distortion: Sequence[float],
+) -> Lens:
     """Build the lens that a ROS camera_info describes.
 
     Parameters

@@ -63,7 +63,7 @@ class Lens(ABC):
     coefficient_counts: ClassVar[tuple[int, ...]] = ()
     has_image_circle: ClassVar[bool] = True
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in ('width', 'height'):
             side = getattr(self, name)
             if not 1 <= side <= MAX_PICTURE_SIDE_PX:
@@ -119,7 +119,7 @@ class Lens(ABC):
         """Normalized picture coordinates (..., 2) to unit rays (..., 3) and their validity."""
 
     def project(self, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Give the pixels at which rays meet the picture.
+        """Return the pixels at which rays meet the picture.
 
         Parameters
         ----------
@@ -147,7 +147,7 @@ class Lens(ABC):
         return pixels, seen
 
     def unproject(self, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Give the rays that meet the picture at pixels; the inverse of `project`.
+        """Return the rays that meet the picture at pixels; the inverse of `project`.
 
         Parameters
         ----------
@@ -183,5 +183,5 @@ class Lens(ABC):
         )
 
     def with_max_angle(self, angle_rad: float) -> 'Lens':
-        """Give the same lens with an image circle of this radius, rad."""
+        """Return the same lens with an image circle of this radius, rad."""
         return replace(self, visible_angle_rad=angle_rad)

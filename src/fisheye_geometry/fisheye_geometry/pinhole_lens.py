@@ -54,7 +54,7 @@ class PinholeLens(Lens):
         limit = angles[folds[0]] if len(folds) else self._STEEPEST
         return float(min(limit, self.visible_angle_rad))
 
-    def _distort(self, rays):
+    def _distort(self, rays: np.ndarray) -> np.ndarray:
         rays = np.asarray(rays, float)
         if not rays.size:
             return rays[..., :2]
@@ -64,7 +64,7 @@ class PinholeLens(Lens):
         )
         return pixels.reshape(*rays.shape[:-1], 2)
 
-    def _undistort(self, normalized):
+    def _undistort(self, normalized: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         shape = normalized.shape[:-1]
         target = normalized.reshape(-1, 2)
         plane = self._start(target)
@@ -93,7 +93,7 @@ class PinholeLens(Lens):
         rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
         return rays.reshape(*shape, 3), seen.reshape(shape)
 
-    def _start(self, target):
+    def _start(self, target: np.ndarray) -> np.ndarray:
         """Undo the radial part by a table: near enough for Newton's method to converge."""
         angles = np.linspace(0.0, self.max_angle_rad, 4096)
         rays = np.stack([np.sin(angles), np.zeros_like(angles), np.cos(angles)], axis=-1)
@@ -103,5 +103,5 @@ class PinholeLens(Lens):
             target * np.divide(plain, radius, out=np.ones_like(radius), where=radius > 0)[:, None]
         )
 
-    def _on_plane(self, plane):
+    def _on_plane(self, plane: np.ndarray) -> np.ndarray:
         return self._distort(np.concatenate([plane, np.ones((len(plane), 1))], axis=-1))

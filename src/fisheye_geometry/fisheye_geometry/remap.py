@@ -19,7 +19,6 @@ _INTERPOLATIONS = {
     'cubic': cv2.INTER_CUBIC,
 }
 INTERPOLATIONS = tuple(_INTERPOLATIONS)
-Turn = Attitude
 
 _OUTSIDE_PX = -100
 """Far enough from the picture that no interpolation reaches it."""
@@ -91,9 +90,11 @@ class RemapTable:
         self.surface = surface
         self._input_shape = (source.height, source.width)
         self._flag = _INTERPOLATIONS[interpolation]
-        self.valid = np.empty(shape, bool)
-        self._pixels = np.empty((*shape, 2), np.int16)
-        self._fractions = None if interpolation == 'nearest' else np.empty(shape, np.uint16)
+        self.valid: np.ndarray = np.empty(shape, bool)
+        self._pixels: np.ndarray = np.empty((*shape, 2), np.int16)
+        self._fractions: np.ndarray | None = None
+        if interpolation != 'nearest':
+            self._fractions = np.empty(shape, np.uint16)
         for rows in self._band_rows():
             where, self.valid[rows] = _source_pixels(source, surface, attitude, rows)
             pixels, fractions = cv2.convertMaps(
@@ -204,7 +205,9 @@ def remap_table(
     return RemapTable(source, surface, interpolation, attitude)
 
 
-def _source_pixels(source: Lens | Surface, surface: Surface, attitude: Attitude, rows: slice):
+def _source_pixels(
+    source: Lens | Surface, surface: Surface, attitude: Attitude, rows: slice
+) -> tuple[np.ndarray, np.ndarray]:
     """Pixels (rows, width, 2) float32 of the source's picture, and where there are any."""
     y, x = np.ogrid[rows, : surface.width]
     pixels, seen = source.project(surface.rays(x, y) @ attitude.matrix)

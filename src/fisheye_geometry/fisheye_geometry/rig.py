@@ -68,7 +68,7 @@ class Rig:
     is_closed
         Whether the last camera and the first are neighbours too.
     apart
-        Indices of the pairs whose rotation nobody has_camera: their pictures stand side by side.
+        Indices of the pairs whose rotation is not known: their images stand side by side.
 
     Raises
     ------
@@ -80,7 +80,7 @@ class Rig:
     is_closed: bool = False
     apart: tuple[int, ...] = ()
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         names = [camera.name for camera in self.cameras]
         if not 1 <= len(names) <= MAX_CAMERAS:
             raise GeometryError(

@@ -14,7 +14,7 @@ _FORGOTTEN_AFTER_S = 60.0
 class Settling:
     """Decides whether a change is followed now, so that what follows from it gets its time."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._followed_s: deque[float] = deque(maxlen=_REMEMBERED)
         self._waits = False
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from math import inf, pi
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from fisheye_core.errors import GeometryError
 from fisheye_geometry.lens import MAX_PICTURE_SIDE_PX, Lens
@@ -49,7 +50,7 @@ class Surface:
     center_x_px: float
     center_y_px: float
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.kind not in KINDS:
             raise GeometryError(
                 f"surface '{self.kind}' is not known; expected one of {', '.join(SURFACES)}"
@@ -80,7 +81,7 @@ class Surface:
         """Whether a turn about the vertical is a shift of columns."""
         return KINDS[self.kind].yaw_is_column_shift
 
-    def rays(self, x_px: np.ndarray, y_px: np.ndarray) -> np.ndarray:
+    def rays(self, x_px: ArrayLike, y_px: ArrayLike) -> np.ndarray:
         """Directions (..., 3) float64, of any length, at pixels (broadcast against each other)."""
         a, b = np.broadcast_arrays(
             (np.asarray(x_px, float) - self.center_x_px) / self.focal_px,
@@ -112,7 +113,7 @@ class Surface:
         return 2 * pi * self.focal_px if self.yaw_is_column_shift else inf
 
     def window(self, x_px: float, y_px: float, width: int, height: int) -> 'Surface':
-        """Give the part whose upper left pixel is (x_px, y_px); it may reach past the edges."""
+        """Return the part whose upper left pixel is (x_px, y_px); it may reach past the edges."""
         return replace(
             self,
             width=width,
@@ -122,7 +123,7 @@ class Surface:
         )
 
     def with_focal(self, focal_px: float) -> 'Surface':
-        """Give the same view, larger or smaller, so that `focal_px` is this one."""
+        """Scale the surface so that `focal_px` is this one."""
         zoom = focal_px / self.focal_px
         return replace(
             self,
@@ -198,7 +199,9 @@ def surface_for(
     )
 
 
-def _extent(asked_rad: float, before_rad: float, after_rad: float, limit_rad: float):
+def _extent(
+    asked_rad: float, before_rad: float, after_rad: float, limit_rad: float
+) -> tuple[float, float]:
     """Angles to either side of the axis: half of what was asked, else what the lens sees."""
     if asked_rad:
         return asked_rad / 2, asked_rad / 2

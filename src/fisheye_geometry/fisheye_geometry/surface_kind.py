@@ -8,6 +8,9 @@ from math import inf, pi
 
 import numpy as np
 
+Rays = tuple[np.ndarray, np.ndarray, np.ndarray]
+Points = tuple[np.ndarray, np.ndarray]
+
 
 class SurfaceKind(ABC):
     """How one kind of surface maps rays of the frame x right, y down, z forward.
@@ -31,11 +34,11 @@ class SurfaceKind(ABC):
     fov_limit_rad: float = inf
 
     @abstractmethod
-    def rays(self, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def rays(self, a: np.ndarray, b: np.ndarray) -> Rays:
         """Return the rays (x, y, z), of any length, at columns and rows."""
 
     @abstractmethod
-    def point(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def point(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> Points:
         """Return the columns and rows of rays, infinite for those that do not meet the surface."""
 
     @abstractmethod
@@ -54,20 +57,20 @@ class Cylindrical(SurfaceKind):
     steepest_rad = np.radians(70)
     widest_rad = pi
 
-    def rays(self, a, b):
+    def rays(self, a: np.ndarray, b: np.ndarray) -> Rays:
         """As `SurfaceKind`."""
         return np.sin(a), b, np.cos(a)
 
-    def point(self, x, y, z):
+    def point(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> Points:
         """As `SurfaceKind`."""
         side = np.hypot(x, z)
         return np.arctan2(x, z), np.divide(y, side, out=np.full_like(y, np.inf), where=side > 0)
 
-    def column(self, angle_rad):
+    def column(self, angle_rad: float) -> float:
         """As `SurfaceKind`."""
         return float(angle_rad)
 
-    def row(self, angle_rad):
+    def row(self, angle_rad: float) -> float:
         """As `SurfaceKind`."""
         return float(np.tan(angle_rad))
 
@@ -79,19 +82,19 @@ class Equirectangular(SurfaceKind):
     steepest_rad = pi / 2
     widest_rad = pi
 
-    def rays(self, a, b):
+    def rays(self, a: np.ndarray, b: np.ndarray) -> Rays:
         """As `SurfaceKind`."""
         return np.cos(b) * np.sin(a), np.sin(b), np.cos(b) * np.cos(a)
 
-    def point(self, x, y, z):
+    def point(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> Points:
         """As `SurfaceKind`."""
         return np.arctan2(x, z), np.arctan2(y, np.hypot(x, z))
 
-    def column(self, angle_rad):
+    def column(self, angle_rad: float) -> float:
         """As `SurfaceKind`."""
         return float(angle_rad)
 
-    def row(self, angle_rad):
+    def row(self, angle_rad: float) -> float:
         """As `SurfaceKind`."""
         return float(angle_rad)
 
@@ -104,20 +107,21 @@ class Rectilinear(SurfaceKind):
     widest_rad = np.radians(60)
     fov_limit_rad = np.radians(170)
 
-    def rays(self, a, b):
+    def rays(self, a: np.ndarray, b: np.ndarray) -> Rays:
         """As `SurfaceKind`."""
         return a, b, np.ones_like(a)
 
-    def point(self, x, y, z):
+    def point(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> Points:
         """As `SurfaceKind`."""
         front = z > 0
-        return tuple(np.divide(c, z, out=np.full_like(c, np.inf), where=front) for c in (x, y))
+        a, b = (np.divide(c, z, out=np.full_like(c, np.inf), where=front) for c in (x, y))
+        return a, b
 
-    def column(self, angle_rad):
+    def column(self, angle_rad: float) -> float:
         """As `SurfaceKind`."""
         return float(np.tan(angle_rad))
 
-    def row(self, angle_rad):
+    def row(self, angle_rad: float) -> float:
         """As `SurfaceKind`."""
         return float(np.tan(angle_rad))
 

@@ -1,4 +1,4 @@
-"""Solving a rig: measured rotations, mounts in their place, and pairs that nobody has_camera."""
+"""Solving a rig: measured rotations, mounts in their place, and pairs of unknown rotation."""
 
 import numpy as np
 import pytest

@@ -13,7 +13,7 @@ _CLOSEST_MS = 0.5
 
 
 @dataclass(frozen=True)
-class Camera:
+class CameraTiming:
     """How one camera's frames come.
 
     Attributes
@@ -70,7 +70,7 @@ class Paired:
 
 def pair_frames(
     make_pairing: Callable[[Sequence[str], int], Any],
-    cameras: Sequence[Camera],
+    cameras: Sequence[CameraTiming],
     *,
     seconds: float = 20.0,
     seed: int = 0,

@@ -19,7 +19,7 @@ _STEP_PX = 8
 _START_S = 60.0
 
 
-class Seen(NamedTuple):
+class SeenPanorama(NamedTuple):
     """A panorama that came.
 
     Attributes
@@ -42,22 +42,21 @@ class Health(Watcher):
 
     Attributes
     ----------
-    seen : list of Seen
+    seen : list of SeenPanorama
         Every panorama since `settle`.
     status : dict
         `DiagnosticStatus` by the node's name, as `left/capture`.
     """
 
     def __init__(self, domain: int, namespace: str = ''):
-        self.seen: list[Seen] = []
+        self.seen: list[SeenPanorama] = []
         self.status: dict[str, DiagnosticStatus] = {}
-        self._usual = None
+        self._usual: np.ndarray = np.zeros(2)
         super().__init__(domain, namespace)
         self.node.create_subscription(DiagnosticArray, '/diagnostics', self._take_status, 50)
 
     def settle(self) -> None:
         """Wait until panoramas come steadily, and take what they show for the usual."""
-        self._usual = None
         self.seen = []
 
         def steady():
@@ -67,9 +66,10 @@ class Health(Watcher):
         wait_for(steady, _START_S, 'a steady panorama')
         self._usual = np.array(self.seen[-1].levels)
 
-    def is_dim(self, entry: Seen) -> tuple[bool, bool]:
+    def is_dim(self, entry: SeenPanorama) -> tuple[bool, bool]:
         """Whether the left and the right side of a panorama are dimmed."""
-        return tuple(np.array(entry.levels) < _BRIGHT_SHARE * self._usual)
+        left, right = np.array(entry.levels) < _BRIGHT_SHARE * self._usual
+        return left, right
 
     def whole(self, since_s: float) -> bool:
         """Whether a panorama with both sides live came since a time."""
@@ -99,7 +99,7 @@ class Health(Watcher):
         image = to_array(message)[::_STEP_PX, ::_STEP_PX]
         quarter = image.shape[1] // 4
         levels = float(image[:, :quarter].mean()), float(image[:, -quarter:].mean())
-        self.seen.append(Seen(time.monotonic(), self.stamps_ns[-1], levels))
+        self.seen.append(SeenPanorama(time.monotonic(), self.stamps_ns[-1], levels))
 
     def _take_status(self, message) -> None:
         self.status.update({status.name: status for status in message.status})

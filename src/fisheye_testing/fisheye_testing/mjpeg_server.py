@@ -8,7 +8,7 @@ import numpy as np
 
 
 def jpeg(level: int, width: int = 64, height: int = 48) -> bytes:
-    """Give a plain grey JPEG."""
+    """Return a plain grey JPEG."""
     return cv2.imencode('.jpg', np.full((height, width, 3), level, np.uint8))[1].tobytes()
 
 

@@ -10,7 +10,7 @@ import socket
 import tempfile
 import time
 from base64 import b64encode
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from fractions import Fraction
 from functools import partial
@@ -93,7 +93,8 @@ class Relay:
     def __init__(self, loss: float):
         self._loss = loss
         self._random = random.Random(3)
-        self._targets, self._lock = [], Lock()
+        self._targets: list[Callable[[int, bytes], object]] = []
+        self._lock = Lock()
         self.has_new = False
         while True:
             first, second = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in 'ab')
@@ -211,7 +212,7 @@ class RtspServer:
                     session.wfile.write(head + datagram)
 
             return send, 'RTP/AVP/TCP;unicast;interleaved=0-1'
-        ports = [int(port) for port in re.search(r'client_port=(\d+)-(\d+)', transport).groups()]
+        ports = [int(p) for p in re.findall(r'\d+', transport.partition('client_port=')[2])[:2]]
         udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         address = session.client_address[0]
         text = f'RTP/AVP;unicast;client_port={ports[0]}-{ports[1]};server_port=6970-6971'

@@ -8,7 +8,7 @@ _ORIENTATION = b'Exif\0\0II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x06\0\0\0
 
 
 def turned(jpeg: bytes) -> bytes:
-    """Give a JPEG of the same pixels whose EXIF says that the camera was held on its side."""
+    """Return a JPEG of the same pixels whose EXIF says that the camera was held on its side."""
     segment = b'\xff\xe1' + (len(_ORIENTATION) + 2).to_bytes(2, 'big') + _ORIENTATION
     return jpeg[:2] + segment + jpeg[2:]
 
@@ -22,7 +22,7 @@ def turned_video(mp4: bytes) -> bytes:
 
 
 def huge_png(side_px: int = 60_000) -> bytes:
-    """Give a PNG of a few bytes that claims to be larger than memory."""
+    """Return a PNG of a few bytes that claims to be larger than memory."""
 
     def chunk(kind, content):
         checksum = struct.pack('>I', zlib.crc32(kind + content))

@@ -32,7 +32,7 @@ _domain_locks: deque = deque(maxlen=20)
 
 
 def executable(node: str) -> Path:
-    """Give the path that `ros2 run` resolves for a node such as `left/capture`."""
+    """Return the path that `ros2 run` resolves for a node such as `left/capture`."""
     name = node.split('/')[-1]
     package = EXECUTABLES[name]
     return Path(get_package_prefix(package)) / 'lib' / package / f'{name}_node'
@@ -61,7 +61,7 @@ def wait_for(condition: Callable[[], object], timeout_s: float, what: str) -> ob
 
 
 def camera_parameters(folder: Path | None) -> dict[str, dict[str, object]]:
-    """Give the parameters of each side's capture for a folder of pictures; None: synthetic."""
+    """Return the parameters of each side's capture for a folder of pictures; None: synthetic."""
     if folder is None:
         return {side: {} for side in SIDES}
     return {
@@ -73,7 +73,7 @@ def camera_parameters(folder: Path | None) -> dict[str, dict[str, object]]:
     }
 
 
-class Rig:
+class RigProcesses:
     """Processes of nodes; as a context manager it ends them all.
 
     Attributes
@@ -89,7 +89,7 @@ class Rig:
         self._log_folder.mkdir(parents=True, exist_ok=True)
         self._environment = {**os.environ, 'ROS_DOMAIN_ID': str(domain), **(environment or {})}
 
-    def __enter__(self) -> 'Rig':
+    def __enter__(self) -> 'RigProcesses':
         return self
 
     def __exit__(self, *_) -> None:
@@ -149,7 +149,7 @@ class Rig:
         return self._wait(node), time.monotonic() - begin
 
     def log(self, node: str) -> Path:
-        """Give the file that holds what a node prints."""
+        """Return the file that holds what a node prints."""
         return self._log_folder / f'{node.replace("/", "_")}.log'
 
     def check_alive(self) -> None:
@@ -160,7 +160,7 @@ class Rig:
                 raise RuntimeError(f'{node} ended with code {process.returncode}:\n{words}')
 
     def last_warnings(self) -> str:
-        """Give the last warning of each node that gave one, and where all are."""
+        """Return the last warning of each node that gave one, and where all are."""
         lines = [f'The logs are in {self._log_folder}.']
         for node in self.processes:
             words = self.log(node).read_text(errors='replace').splitlines()

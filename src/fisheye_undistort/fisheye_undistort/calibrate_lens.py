@@ -12,7 +12,7 @@ from fisheye_undistort.calibration import calibrate
 from fisheye_undistort.collector import Collector
 from fisheye_undistort.detection import Detector
 from fisheye_undistort.pictures import HALVES, read_pictures
-from fisheye_undistort.report import Report
+from fisheye_undistort.report import CalibrationReport
 from fisheye_undistort.target import KINDS, STANDARD, Target
 
 GOOD, FAILED, POOR = 0, 1, 2
@@ -101,7 +101,7 @@ def _run(options: argparse.Namespace) -> int:
     else:
         raise SettingError('nothing to do: give pictures, --topic or --print (see --help)')
     calibration = calibrate(collector.finish(), target, collector.size)
-    report = Report(calibration, collector.brightest, collector.skipped)
+    report = CalibrationReport(calibration, collector.brightest, collector.skipped)
     output = options.output or Path(f'{options.name}.yaml')
     write_camera(output, Camera(options.name, calibration.lens))
     print(f'{report}\nwritten  {output}')

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from itertools import compress
+from math import inf
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from fisheye_core.errors import CalibrationError
 from fisheye_geometry.lens import FisheyeLens
 from fisheye_undistort.circle_bias import center_bias
 from fisheye_undistort.first_guess import first_guess
-from fisheye_undistort.lens_fit import GROUPS, Estimate, View, fit
+from fisheye_undistort.lens_fit import GROUPS, Estimate, TargetView, fit
 from fisheye_undistort.sheet_model import UNKNOWNS, lens_of, to_camera, warp_board
 from fisheye_undistort.target import Target
 
@@ -59,7 +60,7 @@ class Calibration:
 
     lens: FisheyeLens
     estimate: Estimate
-    views: tuple[View, ...]
+    views: tuple[TargetView, ...]
     dropped: dict[str, str]
     target: Target
 
@@ -88,7 +89,7 @@ class Calibration:
 
 
 def calibrate(
-    views: list[View], target: Target, size: tuple[int, int], *, correct_bias: bool = True
+    views: list[TargetView], target: Target, size: tuple[int, int], *, correct_bias: bool = True
 ) -> Calibration:
     """Fit a Kannala-Brandt lens to views of a target.
 
@@ -122,9 +123,12 @@ def calibrate(
     return Calibration(lens, estimate, tuple(fitter.views), dropped, target)
 
 
-def _fit_without_outliers(views, target, size, correct_bias):
+def _fit_without_outliers(
+    views: list[TargetView], target: Target, size: tuple[int, int], correct_bias: bool
+) -> tuple['_Fitter', Estimate, dict[str, str]]:
     """Fit, leave out the views that do not fit, and fit again until all do."""
-    fitter, dropped = _Fitter(views, target, size, correct_bias), {}
+    fitter = _Fitter(views, target, size, correct_bias)
+    dropped: dict[str, str] = {}
     while True:
         sequence = fitter.fit_sequence()
         outliers = _outlying_views(sequence[-1], size)
@@ -168,16 +172,16 @@ class _Fitter:
         The Bayesian information criterion asks of each intrinsic that it lowers the cost by more
         than chance would (Schwarz 1978, doi 10.1214/aos/1176344136).
         """
-        best, bias = None, None
+        best, lowest, bias = sequence[-1], inf, None
         for start in reversed(sequence):
             estimate, bias = self._without_bias(start, bias)
             variance = max(estimate.cost, _LEAST_COST_PX2) / self._equations
             criterion = self._equations * np.log(variance)
             criterion += _unknowns(estimate.free) * np.log(self._equations)
-            if best and criterion > best[0]:
+            if criterion > lowest:
                 break
-            best = criterion, estimate
-        return best[1]
+            best, lowest = estimate, criterion
+        return best
 
     def _without_bias(self, start: Estimate, bias) -> tuple[Estimate, list | None]:
         """Fit, predict by how much the circles' centres of mass are off, and fit again."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fisheye_undistort.lens_fit import Estimate, View
+from fisheye_undistort.lens_fit import Estimate, TargetView
 from fisheye_undistort.sheet_model import project, to_camera, warp_board
 from fisheye_undistort.target import Target
 
@@ -10,7 +10,7 @@ _RIM = np.linspace(0, 2 * np.pi, 32, endpoint=False)
 """Directions of the points that stand for a circle, rad."""
 
 
-def center_bias(estimate: Estimate, views: list[View], target: Target) -> list[np.ndarray]:
+def center_bias(estimate: Estimate, views: list[TargetView], target: Target) -> list[np.ndarray]:
     """Centre of mass of each projected circle minus the projection of its centre, (N, 2) px.
 
     Perspective and the lens magnify the two halves of a circle differently, by a pixel and more

@@ -10,7 +10,7 @@ from fisheye_bridge.topics import ImageSubscription
 from fisheye_core.encodings import converted
 from fisheye_core.errors import SettingError, SourceError
 from fisheye_undistort.collector import Collector
-from fisheye_undistort.pictures import Picture, cut
+from fisheye_undistort.pictures import NamedPicture, cut
 
 _LONGEST_WAIT_S = 10.0
 """Without a picture for so long there is nobody to wait for."""
@@ -37,7 +37,7 @@ class CollectNode(Node):
     def _look(self, image, encoding, header):
         self.count += 1
         gray = cut(converted(image, encoding, 'mono8'), self._half)
-        self._collector.add(Picture(f'picture {self.count}', gray, moving=True))
+        self._collector.add(NamedPicture(f'picture {self.count}', gray, moving=True))
         line = f'{self._collector.progress()}: {self._collector.state or "taken"}'
         print(f'\r{line:{_LINE}.{_LINE}}', end='', file=sys.stderr, flush=True)
 

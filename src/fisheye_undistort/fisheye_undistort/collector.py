@@ -4,8 +4,8 @@ import numpy as np
 
 from fisheye_core.errors import CalibrationError, ImageFormatError
 from fisheye_undistort.detection import Detector
-from fisheye_undistort.lens_fit import View
-from fisheye_undistort.pictures import Picture
+from fisheye_undistort.lens_fit import TargetView
+from fisheye_undistort.pictures import NamedPicture
 
 _MOVED = 0.01
 """A view is new where the target lies this share of the picture's width from all before."""
@@ -16,11 +16,11 @@ _CELLS = (8, 6)
 
 
 class Collector:
-    """Takes pictures and keeps the views worth keeping.
+    """Collector of the views that add information.
 
     Attributes
     ----------
-    views : list of View
+    views : list of TargetView
         What was kept.
     state : str
         Why the last picture was not used, '' if it was.
@@ -36,16 +36,17 @@ class Collector:
 
     def __init__(self, detector: Detector):
         self._detector = detector
-        self._places = []
-        self._last = None
+        self._places: list[np.ndarray] = []
+        self._last: np.ndarray | None = None
         self._looks = self._found = 0
         self._largest = 0.0
-        self.views: list[View] = []
+        self.views: list[TargetView] = []
         self.state = ''
         self.skipped: dict[str, str] = {}
-        self.size = self.brightest = self.example = None
+        self.size = (0, 0)
+        self.brightest = self.example = np.zeros((0, 0), np.uint8)
 
-    def add(self, picture: Picture) -> bool:
+    def add(self, picture: NamedPicture) -> bool:
         """Look at a picture; tell whether its view was kept.
 
         Raises
@@ -80,7 +81,7 @@ class Collector:
 
     def _check_size(self, picture):
         height, width = picture.gray.shape
-        if self.size is None:
+        if not self.brightest.size:
             self.size = (width, height)
             self.brightest = np.zeros_like(picture.gray)
         if self.size != (width, height):
@@ -96,7 +97,7 @@ class Collector:
         if extent > self._largest:
             self._largest, self.example = extent, picture.gray
 
-    def finish(self) -> list[View]:
+    def finish(self) -> list[TargetView]:
         """Return the views.
 
         Raises
@@ -133,7 +134,7 @@ class Collector:
         )
 
 
-def _place(view: View) -> np.ndarray:
+def _place(view: TargetView) -> np.ndarray:
     """Where a view's points lie and how they are spread, (5,) px, whatever their order."""
     spread = np.cov(view.points_px.T)
     scale = np.sqrt(np.trace(spread))

@@ -8,7 +8,7 @@ import numpy as np
 from fisheye_core.errors import CalibrationError
 from fisheye_undistort.circle_grid import find_circles
 from fisheye_undistort.grid_order import order_grid
-from fisheye_undistort.lens_fit import View
+from fisheye_undistort.lens_fit import TargetView
 from fisheye_undistort.target import MARKERS, Target, marker_dictionary
 
 _MIN_CORNERS = 8
@@ -29,7 +29,7 @@ class Detector:
     min_area_px: float = 0.0
     max_area_px: float = 0.0
 
-    def __call__(self, name: str, gray: np.ndarray) -> View:
+    def __call__(self, name: str, gray: np.ndarray) -> TargetView:
         """Find the target's points.
 
         Parameters
@@ -51,7 +51,7 @@ class Detector:
             points, ids = _chessboard(gray, self.target)
         else:
             points, ids = _charuco(gray, self.target)
-        return View(name, points, ids)
+        return TargetView(name, points, ids)
 
 
 def _chessboard(gray: np.ndarray, target: Target):

@@ -4,14 +4,14 @@ import cv2
 import numpy as np
 
 from fisheye_geometry.lens import FisheyeLens
-from fisheye_undistort.lens_fit import Estimate, View
+from fisheye_undistort.lens_fit import Estimate, TargetView
 from fisheye_undistort.sheet_model import UNKNOWNS, lens_of, project, to_camera
 
 _FOCAL_SCAN = np.geomspace(0.4, 4.0, 15)
 """Starts tried, in shares of width / pi: from a circle in the middle to a narrow lens."""
 
 
-def first_guess(views: list[View], points_mm: np.ndarray, size: tuple[int, int]) -> Estimate:
+def first_guess(views: list[TargetView], points_mm: np.ndarray, size: tuple[int, int]) -> Estimate:
     """Try lenses without distortion around focal length = width / pi, the axis in the middle.
 
     Parameters
@@ -40,7 +40,7 @@ def first_guess(views: list[View], points_mm: np.ndarray, size: tuple[int, int])
     return min(candidates, key=lambda candidate: candidate[0])[2]
 
 
-def _pose(view: View, points_mm: np.ndarray, lens: FisheyeLens) -> np.ndarray:
+def _pose(view: TargetView, points_mm: np.ndarray, lens: FisheyeLens) -> np.ndarray:
     """Pose (6,) from the homography between the sheet and rays, which may lie behind the plane."""
     rays, _ = lens.unproject(view.points_px)
     scale = np.abs(points_mm[:, :2]).max()

@@ -84,7 +84,7 @@ class _Neighbourhood:
             if abs(np.hypot(*offset) - np.hypot(*step_mm)) < self._limit_mm:
                 yield self._stretch[seed] @ _rotations(_angle(offset) - _angle(step_mm))
 
-    def grow(self, seed: int, jacobian: np.ndarray) -> tuple[dict[int, tuple], float]:
+    def grow(self, seed: int, jacobian: np.ndarray) -> tuple[dict[int, tuple[int, int]], float]:
         """Walk from neighbour to neighbour, the surest step first.
 
         Returns
@@ -94,7 +94,10 @@ class _Neighbourhood:
         mismatch_mm : float
             Mean distance of the circles from where the steps led.
         """
-        cells, residuals, steps, order = {}, [], [], count()
+        cells: dict[int, tuple[int, int]] = {}
+        residuals: list[float] = []
+        steps: list[tuple[float, int, list]] = []
+        order = count()
         circle, cell, residual = seed, (0, 0), 0.0
         while True:
             if circle not in cells and cell not in cells.values():

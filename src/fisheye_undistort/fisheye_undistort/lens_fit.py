@@ -1,6 +1,6 @@
 """Least squares over a lens, the warp of the board and its poses, with analytic derivatives."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
@@ -35,7 +35,7 @@ _UNDETERMINED = 1e-12
 
 
 @dataclass(frozen=True)
-class View:
+class TargetView:
     """One picture of the target.
 
     Attributes
@@ -76,7 +76,7 @@ class Estimate:
     unknowns: np.ndarray
     poses: np.ndarray
     residuals_px: tuple[np.ndarray, ...] = ()
-    covariance: np.ndarray | None = None
+    covariance: np.ndarray = field(default_factory=lambda: np.zeros((len(UNKNOWNS),) * 2))
     cost: float = np.inf
     free: tuple[str, ...] = ()
 
@@ -97,7 +97,7 @@ def rms(residuals_px: np.ndarray) -> float:
 
 
 def fit(
-    views: list[View],
+    views: list[TargetView],
     points_mm: np.ndarray,
     start: Estimate,
     nominal: np.ndarray,
@@ -124,7 +124,7 @@ def fit(
     tolerance
         Relative change of the cost at which to stop.
     """
-    problem = _Problem(views, points_mm, nominal, free, bias_px)
+    problem = _FitProblem(views, points_mm, nominal, free, bias_px)
     solution = least_squares(
         problem.residuals,
         problem.pack(start),
@@ -146,7 +146,7 @@ def fit(
     )
 
 
-class _Problem:
+class _FitProblem:
     """Residuals and their derivatives as functions of one vector: free unknowns, then poses."""
 
     def __init__(self, views, points_mm, nominal, free, bias_px):

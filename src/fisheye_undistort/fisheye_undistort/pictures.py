@@ -21,7 +21,7 @@ _LOOKS_PER_SECOND = 10
 
 
 @dataclass(frozen=True)
-class Picture:
+class NamedPicture:
     """A picture and what to call it.
 
     Attributes
@@ -39,7 +39,7 @@ class Picture:
     moving: bool = False
 
 
-def read_pictures(paths: Iterable[str | Path], half: str = '') -> Iterator[Picture]:
+def read_pictures(paths: Iterable[str | Path], half: str = '') -> Iterator[NamedPicture]:
     """Read pictures one after another.
 
     Parameters
@@ -57,7 +57,7 @@ def read_pictures(paths: Iterable[str | Path], half: str = '') -> Iterator[Pictu
     for path in _expand(paths):
         pictures = [_picture(path)] if is_picture(path) else _frames(path)
         for picture in pictures:
-            yield Picture(picture.name, cut(picture.gray, half), picture.moving)
+            yield NamedPicture(picture.name, cut(picture.gray, half), picture.moving)
 
 
 def cut(gray: np.ndarray, half: str) -> np.ndarray:
@@ -77,11 +77,11 @@ def _expand(paths: Iterable[str | Path]) -> list[Path]:
     return found
 
 
-def _picture(path: Path) -> Picture:
-    return Picture(path.name, read_picture(path, grey=True))
+def _picture(path: Path) -> NamedPicture:
+    return NamedPicture(path.name, read_picture(path, grey=True))
 
 
-def _frames(path: Path) -> Iterator[Picture]:
+def _frames(path: Path) -> Iterator[NamedPicture]:
     video = cv2.VideoCapture(str(path))
     try:
         rate = video.get(cv2.CAP_PROP_FPS)
@@ -93,7 +93,7 @@ def _frames(path: Path) -> Iterator[Picture]:
                 if not read:
                     break
                 gray = from_opencv(frame, 'mono8')
-                yield Picture(f'{path.name} frame {number}', gray, moving=True)
+                yield NamedPicture(f'{path.name} frame {number}', gray, moving=True)
             number += 1
     finally:
         video.release()

@@ -28,7 +28,7 @@ _BAR = 30
 
 
 @dataclass(frozen=True)
-class Report:
+class CalibrationReport:
     """Figures of a calibration and of how well the views cover what the lens sees.
 
     Attributes

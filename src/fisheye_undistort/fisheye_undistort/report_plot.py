@@ -12,7 +12,7 @@ from fisheye_geometry.remap import RemapTable
 from fisheye_geometry.surface import surface_for
 from fisheye_undistort.calibration import Calibration
 from fisheye_undistort.figure_file import check_suffix, write_figure
-from fisheye_undistort.report import Report
+from fisheye_undistort.report import CalibrationReport
 
 _SIZE_INCH = (16, 9.5)
 _TITLE = 150
@@ -37,7 +37,7 @@ def check_plot(path: Path) -> None:
         raise FileAccessError(path, 'written', f'there is no folder {path.parent}')
 
 
-def plot_report(path: str | Path, report: Report, example: np.ndarray) -> None:
+def plot_report(path: str | Path, report: CalibrationReport, example: np.ndarray) -> None:
     """Write the plot as PNG, PDF or SVG.
 
     Parameters
@@ -101,7 +101,7 @@ def _residuals(axes, calibration: Calibration) -> None:
     )
 
 
-def _coverage(axes, report: Report) -> None:
+def _coverage(axes, report: CalibrationReport) -> None:
     angle, azimuth = report.calibration.directions_rad
     edge = np.degrees(report.edge_rad)
     axes.set_theta_direction(-1)  # y points down in a picture
@@ -111,7 +111,7 @@ def _coverage(axes, report: Report) -> None:
     axes.set_title(f'degrees from the axis; red: the picture ends at {edge:.0f}')
 
 
-def _distortion(axes, report: Report) -> None:
+def _distortion(axes, report: CalibrationReport) -> None:
     lens = report.calibration.lens
     covered = report.calibration.directions_rad[0].max()
     angles = np.linspace(0, min(lens.max_angle_rad, report.edge_rad * 1.1), 200)

@@ -13,6 +13,7 @@ from fisheye_bridge.projection import projection_of
 from fisheye_bridge.qos import IMAGE, LATCHED
 from fisheye_bridge.running import run
 from fisheye_core.background import Background
+from fisheye_geometry.lens import Lens
 from fisheye_undistort.correction import Correction
 from fisheye_undistort.undistort_settings import UndistortSettings
 
@@ -24,7 +25,9 @@ class UndistortNode(Node):
 
     def __init__(self, **kwargs):
         super().__init__('undistort', **kwargs)
-        self._camera = self._correction = self._buffer = self._asked = None
+        self._correction: Correction | None = None
+        self._buffer: ImageBuffer | None = None
+        self._asked: tuple[Lens, UndistortSettings] | None = None
         self._header = Header()
         self._corrected = 0
         self._declared = Parameters(self, UndistortSettings, on_change=self._rebuild)
@@ -51,7 +54,7 @@ class UndistortNode(Node):
 
     def _rebuild(self, settings):
         """Build the maps in the background; frames use the old ones until then."""
-        lens = self._camera.lens if self._camera else None
+        lens = self._camera.lens
         if lens is None:
             return
         settings.surface_of(lens)

@@ -8,7 +8,7 @@ import pytest
 from rendered_view import render_view, scattered_poses
 
 from fisheye_geometry.lens import FisheyeLens
-from fisheye_undistort.lens_fit import View
+from fisheye_undistort.lens_fit import TargetView
 from fisheye_undistort.target import STANDARD
 
 DATA = Path(os.environ.get('FISHEYE_DATA', ''))
@@ -31,10 +31,10 @@ def fisheye(fov_deg: int, scale: int = 1) -> FisheyeLens:
     )
 
 
-def seen_exactly(lens, target, pose, name='view') -> View:
+def seen_exactly(lens, target, pose, name='view') -> TargetView:
     """Return the projections of a target's points."""
     points = target.points_mm @ pose.rotation.T + pose.translation_mm
-    return View(name, lens.project(points)[0], np.arange(len(points)))
+    return TargetView(name, lens.project(points)[0], np.arange(len(points)))
 
 
 @pytest.fixture

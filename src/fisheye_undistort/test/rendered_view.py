@@ -34,7 +34,7 @@ class Look:
 
 
 @dataclass(frozen=True)
-class Pose:
+class TargetPose:
     """Where the target is: its frame to the camera's, rotation (3, 3) and translation (3,) mm."""
 
     rotation: np.ndarray
@@ -43,7 +43,7 @@ class Pose:
 
 def facing_pose(
     azimuth_rad: float, angle_rad: float, distance_mm: float, tilt_rad=(0.0, 0.0, 0.0)
-) -> Pose:
+) -> TargetPose:
     """Put the target's middle where a direction points, facing the camera but for a tilt.
 
     Parameters
@@ -60,12 +60,12 @@ def facing_pose(
     axis = angle_rad * np.array([-np.sin(azimuth_rad), np.cos(azimuth_rad), 0.0])
     facing = cv2.Rodrigues(axis)[0]
     rotation = facing @ cv2.Rodrigues(np.array(tilt_rad, float))[0]
-    return Pose(rotation, facing @ (0.0, 0.0, distance_mm))
+    return TargetPose(rotation, facing @ (0.0, 0.0, distance_mm))
 
 
 def scattered_poses(
     lens: Lens, target: Target, count: int, distance_mm: tuple[float, float], seed: int = 0
-) -> list[Pose]:
+) -> list[TargetPose]:
     """Poses all over the picture in which a lens sees the whole pattern, tilted at random."""
     random = np.random.default_rng(seed)
     reach = np.abs(target.points_mm).max(axis=0) + target.radius_mm
@@ -89,7 +89,9 @@ def scattered_poses(
     raise GeometryError(f'the lens sees the whole {target} too seldom from {distance_mm} mm')
 
 
-def render_view(lens: Lens, target: Target, pose: Pose, look: Look = Look(), seed=0) -> np.ndarray:
+def render_view(
+    lens: Lens, target: Target, pose: TargetPose, look: Look = Look(), seed=0
+) -> np.ndarray:
     """Photograph the printed sheet in front of a mottled backdrop.
 
     Returns
@@ -118,13 +120,13 @@ def render_view(lens: Lens, target: Target, pose: Pose, look: Look = Look(), see
 
 
 def _mottle(shape: tuple[int, int], random) -> np.ndarray:
-    """Give a backdrop that is not plain, around 1."""
+    """Return a backdrop that is not plain, around 1."""
     return cv2.resize(
         random.normal(1.0, 0.3, (12, 16)), shape[::-1], interpolation=cv2.INTER_CUBIC
     )
 
 
-def _window(lens: Lens, target: Target, pose: Pose) -> tuple[int, int, int, int]:
+def _window(lens: Lens, target: Target, pose: TargetPose) -> tuple[int, int, int, int]:
     """Rows and columns of the picture that hold the sheet: top, bottom, left, right."""
     sheet, origin = _sheet(target)
     height, width = sheet.shape
@@ -142,7 +144,7 @@ def _window(lens: Lens, target: Target, pose: Pose) -> tuple[int, int, int, int]
     return first[1], last[1], first[0], last[0]
 
 
-def _sheet_seen(rays, seen, target: Target, pose: Pose) -> tuple[np.ndarray, np.ndarray]:
+def _sheet_seen(rays, seen, target: Target, pose: TargetPose) -> tuple[np.ndarray, np.ndarray]:
     """Shares of ink and of sheet in each pixel, from rays (rows * n, columns * n, 3)."""
     sheet, origin = _sheet(target)
     x, y, depth = np.moveaxis(rays @ pose.rotation, -1, 0)

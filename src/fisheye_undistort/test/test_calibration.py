@@ -11,7 +11,7 @@ from fisheye_geometry.surface import surface_for
 from fisheye_undistort.calibration import calibrate
 from fisheye_undistort.circle_bias import center_bias
 from fisheye_undistort.detection import Detector
-from fisheye_undistort.lens_fit import Estimate, View
+from fisheye_undistort.lens_fit import Estimate, TargetView
 from fisheye_undistort.pictures import read_pictures
 from fisheye_undistort.sheet_model import warp_board
 from fisheye_undistort.target import STANDARD, Target
@@ -78,7 +78,7 @@ def test_the_start_finds_any_focal_length(focal_px):
 def test_one_wrong_point_is_outvoted(exact_views, paper_lens):
     random = np.random.default_rng(1)
     views = [
-        View(v.name, v.points_px + random.normal(0, 0.05, v.points_px.shape), v.ids)
+        TargetView(v.name, v.points_px + random.normal(0, 0.05, v.points_px.shape), v.ids)
         for v in exact_views
     ]
     views[3].points_px[11] += (25, -10)
@@ -86,7 +86,9 @@ def test_one_wrong_point_is_outvoted(exact_views, paper_lens):
 
 
 def test_a_view_that_does_not_fit_is_dropped_and_named(exact_views, paper_lens):
-    wrong = View('wrong.png', exact_views[2].points_px[::-1].copy(), exact_views[2].ids.copy())
+    wrong = TargetView(
+        'wrong.png', exact_views[2].points_px[::-1].copy(), exact_views[2].ids.copy()
+    )
     wrong.points_px[:35] += 6
     calibration = calibrate([*exact_views, wrong], BOARD, SIZE)
     assert list(calibration.dropped) == ['wrong.png']
@@ -100,7 +102,7 @@ def test_a_board_that_is_not_flat_does_not_bend_the_lens(paper_lens):
     points = warp_board(BOARD.points_mm, warp_mm)
     random = np.random.default_rng(0)
     views = [
-        View(
+        TargetView(
             '',
             paper_lens.project(points @ pose.rotation.T + pose.translation_mm)[0]
             + random.normal(0, 0.05, (70, 2)),
@@ -118,7 +120,7 @@ def test_what_does_not_help_is_not_fitted():
     plain = replace(fisheye(170), focal_y_px=215.0, distortion=(0.02, 0.0, 0.0, 0.0))
     random = np.random.default_rng(5)
     views = [
-        View(v.name, v.points_px + random.normal(0, 0.1, v.points_px.shape), v.ids)
+        TargetView(v.name, v.points_px + random.normal(0, 0.1, v.points_px.shape), v.ids)
         for v in (
             seen_exactly(plain, BOARD, pose)
             for pose in scattered_poses(plain, BOARD, 8, (120, 220))
@@ -234,4 +236,4 @@ def test_a_view_that_tells_nothing_is_refused():
     # Neither perspective nor distortion: the lens could have any focal length.
     points_px = PAPER.points_mm[:, :2] + (320, 240)
     with pytest.raises(CalibrationError, match='no lens fits what was seen'):
-        calibrate([View('', points_px, np.arange(9))], PAPER, SIZE)
+        calibrate([TargetView('', points_px, np.arange(9))], PAPER, SIZE)

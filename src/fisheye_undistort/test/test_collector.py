@@ -3,8 +3,8 @@ import pytest
 
 from fisheye_core.errors import CalibrationError, ImageFormatError
 from fisheye_undistort.collector import Collector
-from fisheye_undistort.lens_fit import View
-from fisheye_undistort.pictures import Picture
+from fisheye_undistort.lens_fit import TargetView
+from fisheye_undistort.pictures import NamedPicture
 
 GRID = np.stack(np.meshgrid(np.arange(3), np.arange(3)), axis=-1).reshape(-1, 2) * 40.0
 SIZE = (640, 480)
@@ -18,7 +18,7 @@ def collector():
         x, y = gray[0, :2].astype(float) * 2
         if x == 0:
             raise CalibrationError('nothing there')
-        return View(name, GRID + np.array([x, y]), np.arange(9))
+        return TargetView(name, GRID + np.array([x, y]), np.arange(9))
 
     return Collector(detect)
 
@@ -26,7 +26,7 @@ def collector():
 def shot(name, x=0, y=0, moving=False, size=SIZE):
     gray = np.zeros(size[::-1], np.uint8)
     gray[0, :2] = x // 2, y // 2
-    return Picture(name, gray, moving)
+    return NamedPicture(name, gray, moving)
 
 
 def test_new_places_are_kept(collector):

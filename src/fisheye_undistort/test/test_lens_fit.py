@@ -4,7 +4,7 @@ from conftest import seen_exactly
 from rendered_view import scattered_poses
 
 from fisheye_undistort.first_guess import first_guess
-from fisheye_undistort.lens_fit import GROUPS, Estimate, View, _damp, _Problem, fit
+from fisheye_undistort.lens_fit import GROUPS, Estimate, TargetView, _damp, _FitProblem, fit
 from fisheye_undistort.sheet_model import UNKNOWNS, lens_of, project, warp_board
 from fisheye_undistort.target import Target
 
@@ -50,7 +50,7 @@ def test_derivatives_of_the_projection(ray):
 
 def test_derivatives_of_the_whole_problem(views):
     nominal = np.concatenate([UNKNOWN_TRUTH[:4] + 5, np.zeros(7)])
-    problem = _Problem(views, TARGET.points_mm, nominal, tuple(GROUPS), None)
+    problem = _FitProblem(views, TARGET.points_mm, nominal, tuple(GROUPS), None)
     poses = np.tile([0.2, -0.1, 0.3, 10.0, 5.0, 180.0], (len(views), 1))
     vector = problem.pack(Estimate(UNKNOWN_TRUTH, poses))
     jacobian = problem.jacobian(vector)
@@ -83,7 +83,7 @@ def test_deviations_are_those_of_repeated_fits(views):
     poses = first_guess(views, TARGET.points_mm, (640, 480)).poses
     for _ in range(30):
         noisy = [
-            View(v.name, v.points_px + random.normal(0, noise_px, v.points_px.shape), v.ids)
+            TargetView(v.name, v.points_px + random.normal(0, noise_px, v.points_px.shape), v.ids)
             for v in views
         ]
         estimate = fit(noisy, TARGET.points_mm, Estimate(nominal, poses), nominal, free)

@@ -7,8 +7,8 @@ from rendered_view import facing_pose, scattered_poses
 
 from fisheye_core.errors import FileAccessError
 from fisheye_undistort.calibration import calibrate
-from fisheye_undistort.lens_fit import View
-from fisheye_undistort.report import Report
+from fisheye_undistort.lens_fit import TargetView
+from fisheye_undistort.report import CalibrationReport
 from fisheye_undistort.report_plot import plot_report
 from fisheye_undistort.target import Target
 
@@ -23,8 +23,8 @@ def report(lens, poses, noise_px=0.05):
     for number, pose in enumerate(poses):
         view = seen_exactly(lens, BOARD, pose, f'shot{number}.png')
         noise = random.normal(0, noise_px, view.points_px.shape)
-        views.append(View(view.name, view.points_px + noise, view.ids))
-    return Report(calibrate(views, BOARD, SIZE), BRIGHT, {'blank.png': 'no chessboard'})
+        views.append(TargetView(view.name, view.points_px + noise, view.ids))
+    return CalibrationReport(calibrate(views, BOARD, SIZE), BRIGHT, {'blank.png': 'no chessboard'})
 
 
 @pytest.fixture(scope='module')
@@ -102,6 +102,6 @@ def test_the_plot_is_drawn(good, tmp_path):
 
 def test_dropped_views_are_told(good):
     dropped = replace(good.calibration, dropped={'odd.png': 'does not fit: rms 9.00 px'})
-    text = str(Report(dropped, BRIGHT, {}))
+    text = str(CalibrationReport(dropped, BRIGHT, {}))
     assert 'odd.png' in text
     assert 'rms 9.00 px' in text

@@ -54,14 +54,14 @@ YES, NO = ('true', '1', 'yes', 'on'), ('false', '0', 'no', 'off')
 
 
 def start(context):
-    """Say what to start."""
+    """Return what to start."""
     check_names(context.argv)
     arguments = checked(context.launch_configurations)
     return [SetParameter('use_sim_time', arguments['use_sim_time']), *nodes(arguments)]
 
 
 def check_names(words):
-    """Refuse arguments of the command line that nobody has_camera."""
+    """Refuse arguments of the command line that do not exist."""
     if not any(Path(word).name == Path(__file__).name for word in sys.argv):
         return  # another file includes this one, and may have arguments of its own
     for name in (word.partition(':=')[0] for word in words):
@@ -70,7 +70,7 @@ def check_names(words):
 
 
 def checked(arguments):
-    """Give the arguments, those that are true or false as bool."""
+    """Return the arguments, those that are true or false as bool."""
     flags = {name: flag(name, arguments[name]) for name in FLAGS}
     paths = {name: os.path.expanduser(arguments[name]) for name in ('params_file', 'overlap_file')}
     if not Path(paths['params_file']).is_file():
@@ -106,7 +106,7 @@ def check_tf2():
 
 
 def nodes(arguments):
-    """Say which nodes to start."""
+    """Return the nodes to start."""
     robot, base = arguments['robot'], arguments['base']
     started = []
     if robot or not (base or arguments['composed']):
@@ -136,7 +136,7 @@ def node(arguments, package, name, namespace='', **parameters):
 
 
 def captures(arguments):
-    """Give the nodes that read the cameras."""
+    """Return the nodes that read the cameras."""
     return [
         node(
             arguments,
@@ -152,7 +152,7 @@ def captures(arguments):
 
 
 def separate(arguments):
-    """Give the nodes that make the panorama of what the captures publish."""
+    """Return the nodes that make the panorama of what the captures publish."""
     transport, overlap_file = arguments['transport'], arguments['overlap_file']
     corrections = [
         node(arguments, 'fisheye_undistort', 'undistort', camera, transport=transport)
@@ -162,7 +162,7 @@ def separate(arguments):
 
 
 def composed(arguments):
-    """Give the node that does all; at the base of a link it takes the captures' topics."""
+    """Return the node that does all; at the base of a link it takes the captures' topics."""
     own = {
         f'{camera}.{name}': arguments[f'{camera}_{name}']
         for camera in CAMERAS
@@ -199,7 +199,7 @@ def transforms(arguments):
 
 
 def angle_between_cameras_deg(given, path):
-    """Give the angle as it was given or else measured, deg; None if it is not measured yet."""
+    """Return the angle as it was given or else measured, deg; None if it is not measured yet."""
     if given:
         return number('yaw_deg', given)
     if not path:
@@ -213,7 +213,7 @@ def angle_between_cameras_deg(given, path):
 
 
 def measured_yaw_deg(path):
-    """Give the angle between the two axes that was measured and saved, deg."""
+    """Return the angle between the two axes that was measured and saved, deg."""
     try:
         saved = read_mapping(path)
         (left, right), (overlap,) = saved['cameras'], saved['overlaps']

@@ -24,7 +24,7 @@ _AROUND = 2048
 
 
 def lens(width: int = 640, height: int = 480, fov_deg: float = 170.0) -> FisheyeLens:
-    """Give an equidistant lens whose image circle is as wide as its picture."""
+    """Return an equidistant lens whose image circle is as wide as its picture."""
     focal = width / radians(fov_deg)
     return FisheyeLens(
         width,
@@ -39,7 +39,7 @@ def lens(width: int = 640, height: int = 480, fov_deg: float = 170.0) -> Fisheye
 
 
 def world(seed: int = 0) -> np.ndarray:
-    """Give a world of blots of all sizes on a textured ground, (1024, 2048) uint8."""
+    """Return a world of blots of all sizes on a textured ground, (1024, 2048) uint8."""
     rng = np.random.default_rng(seed)
     noise = rng.normal(0, 1, (_AROUND // 2, _AROUND)).astype(np.float32)
     picture = cv2.GaussianBlur(noise, (0, 0), 4) * 150 + 110
@@ -51,14 +51,14 @@ def world(seed: int = 0) -> np.ndarray:
 
 
 def slats(period_deg: float) -> np.ndarray:
-    """Give a world of upright slats that repeat themselves all around."""
+    """Return a world of upright slats that repeat themselves all around."""
     degrees = np.arange(_AROUND) * (360 / _AROUND)
     row = np.where(degrees % period_deg < period_deg / 2, 60, 190)
     return np.repeat(row[None], _AROUND // 2, axis=0).astype(np.uint8)
 
 
 def look(world: np.ndarray, surface: Surface, yaw_deg: float, lens: FisheyeLens) -> np.ndarray:
-    """Give the corrected picture of a level camera, 0 outside its image circle."""
+    """Return the corrected picture of a level camera, 0 outside its image circle."""
     height, width = world.shape
     sphere = Surface(
         'equirectangular', width, height, width / 2 / pi, (width - 1) / 2, (height - 1) / 2
@@ -70,7 +70,7 @@ def look(world: np.ndarray, surface: Surface, yaw_deg: float, lens: FisheyeLens)
 def pair(
     kind: str = 'cylindrical', seed: int = 0, yaw_deg: float = YAW_DEG, scene=None, camera=None
 ):
-    """Give ((left, right), (left surface, right surface), true offset in px) of a level rig."""
+    """Return ((left, right), (left surface, right surface), true offset in px) of a level rig."""
     camera = camera or lens()
     surface = surface_for(camera, kind)
     scene = world(seed) if scene is None else scene
@@ -79,13 +79,13 @@ def pair(
 
 
 def tilted(picture: np.ndarray, surface: Surface, turn: Turn) -> np.ndarray:
-    """Give the picture that a turn about one axis makes level again."""
+    """Return the picture that a turn about one axis makes level again."""
     back = Turn(-turn.yaw_rad, -turn.pitch_rad, -turn.roll_rad)
     return RemapTable(surface, surface, attitude=back)(picture)
 
 
 def exposed(picture: np.ndarray, gain: float, noise: float, seed: int = 7) -> np.ndarray:
-    """Give the picture as another camera takes it."""
+    """Return the picture as another camera takes it."""
     rng = np.random.default_rng(seed)
     return _seen_as(picture, picture * gain + rng.normal(0, noise, picture.shape))
 
@@ -107,7 +107,7 @@ def data_folder(name: str) -> Path:
 
 
 def real_views(name: str, kind: str = 'cylindrical', turn: Turn = LEVEL):
-    """Give ((left, right) grey, surfaces) of a rig of real pictures, the right one turned."""
+    """Return ((left, right) grey, surfaces) of a rig of real pictures, the right one turned."""
     folder = data_folder('rigs') / name
     pictures, surfaces = [], []
     for side, attitude in (('left', LEVEL), ('right', turn)):

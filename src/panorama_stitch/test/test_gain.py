@@ -26,7 +26,7 @@ UNSEEN_LEVELS = 0.5
 
 
 def pictures(left=1.0, right=1.0):
-    """Take pictures with different exposures, one number or one for each channel."""
+    """Photograph with different exposures, one number or one for each channel."""
     return [
         np.minimum(Scene().view(LENS, Turn(yaw_rad=yaw)).frame(0) * np.asarray(gain), 255).astype(
             np.uint8

@@ -57,7 +57,7 @@ class Rig:
         monkeypatch.setattr(self.file, 'get_package_prefix', lambda _: '/usr')
 
     def start(self, **given):
-        """Give the nodes by name and the value of use_sim_time."""
+        """Return the nodes by name and the value of use_sim_time."""
         values = {name: value for name, (value, _) in self.file.ARGUMENTS.items()}
         words = [f'{name}:={value}' for name, value in given.items()]
         context = SimpleNamespace(argv=words, launch_configurations={**values, **given})
@@ -65,7 +65,7 @@ class Rig:
         return {f'{vars(n).get("namespace", "")}/{n.name}'.strip('/'): n for n in nodes}, sim_time
 
     def given(self, node):
-        """Give the parameters of a node beside its file."""
+        """Return the parameters of a node beside its file."""
         return node.parameters[1]
 
 
@@ -112,7 +112,7 @@ def test_what_is_given_reaches_the_nodes_that_it_concerns(rig):
 
 
 def test_only_the_panorama_node_takes_topics(rig):
-    given = dict(base='true', composed='true', left_source='0')
+    given = {'base': 'true', 'composed': 'true', 'left_source': '0'}
     alone, _ = rig.start(**given)
     nodes, _ = rig.start(**given, robot='true')
     assert rig.given(nodes['panorama']) == rig.given(alone['panorama']) == TOPICS

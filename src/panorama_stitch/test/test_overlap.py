@@ -146,7 +146,7 @@ def test_most_pairs_without_a_common_scene_mean_none(town):
 
 @pytest.fixture(scope='module')
 def fence():
-    """Give a pair of views of slats every 5 degrees: any of their offsets would do."""
+    """Return a pair of views of slats every 5 degrees: any of their offsets would do."""
     (left, right), surfaces, true_px = pair(scene=slats(5.0))
     return (exposed(left, 1.0, NOISE), exposed(right, 1.0, NOISE, seed=8)), surfaces, true_px
 

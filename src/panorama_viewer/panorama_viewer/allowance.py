@@ -12,7 +12,7 @@ class Allowance:
         self._left, self._seen_s = burst, now_s
 
     def take(self, amount: float, now_s: float) -> bool:
-        """Take an amount; return whether so much was left."""
+        """Spend an amount; return whether so much was left."""
         refill = (now_s - self._seen_s) * self._per_s
         self._left, self._seen_s = min(self._burst, self._left + refill), now_s
         if amount > self._left:

@@ -20,7 +20,7 @@ class Audience:
         return iter(list(self._browsers))
 
     def enter(self, browser: Browser) -> bool:
-        """Give a browser a place; return whether there was one."""
+        """Admit a browser; return whether there was room."""
         if len(self) >= self._places:
             stranger = next((b for b in self._browsers if not b.is_known), None)
             if not browser.is_known or stranger is None:
@@ -33,7 +33,7 @@ class Audience:
         return True
 
     def leave(self, browser: Browser) -> None:
-        """Take a browser's place back, if it has one."""
+        """Free a browser's place, if it has one."""
         if browser in self._browsers:
             del self._browsers[browser]
             if not self._browsers:

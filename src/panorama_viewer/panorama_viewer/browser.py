@@ -17,7 +17,7 @@ _FAREWELL_S = 1.0
 """What a browser that takes nothing more may hold its end up."""
 
 
-class Picture(NamedTuple):
+class TimedJpeg(NamedTuple):
     """A JPEG and when it came, s of the event loop's clock."""
 
     jpeg: bytes
@@ -38,7 +38,7 @@ class Browser:
         stream: web.WebSocketResponse,
         connection: Connection,
         state: Callable[[], dict[str, Any]],
-        picture: Callable[[], Picture | None],
+        picture: Callable[[], TimedJpeg | None],
         *,
         is_known: bool,
     ):
@@ -60,7 +60,7 @@ class Browser:
         self._reason = ''
         self._is_ready = True
         self._told: dict[str, Any] | None = None
-        self._sent: Picture | None = None
+        self._sent: TimedJpeg | None = None
         self._sent_s = self._way_s = 0.0
         self._silence: asyncio.TimerHandle | None = None
 
@@ -87,7 +87,7 @@ class Browser:
                 part.cancel()
 
     async def close(self) -> None:
-        """Tell the browser that the viewer ends."""
+        """Notify the browser that the viewer ends."""
         await self._stream.close(code=WSCloseCode.GOING_AWAY)
 
     async def _feed(self) -> None:

@@ -57,7 +57,7 @@ class Connection(asyncio.Protocol):
         """End it at once, whatever is still to be sent."""
         self.transport.abort()
 
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Begin."""
         self.transport = transport
         self.set_deadline(ANSWERED_WITHIN_S)
@@ -65,14 +65,14 @@ class Connection(asyncio.Protocol):
         self._served.connection_made(transport)
 
     def data_received(self, data: bytes) -> None:
-        """Take bytes, as long as it sends no more than a page would."""
+        """Pass bytes on as long as they are no more than a page would send."""
         if self._bytes.take(len(data), self._loop.time()):
             self._served.data_received(data)
         else:
             self.abort()
 
     def eof_received(self) -> bool | None:
-        """Take the end of what comes."""
+        """Handle the end of the input."""
         return self._served.eof_received()
 
     def connection_lost(self, error: Exception | None) -> None:
@@ -82,9 +82,9 @@ class Connection(asyncio.Protocol):
         self._served.connection_lost(error)
 
     def pause_writing(self) -> None:
-        """Take no more for now."""
+        """Pause writing."""
         self._served.pause_writing()
 
     def resume_writing(self) -> None:
-        """Take more again."""
+        """Resume writing."""
         self._served.resume_writing()

@@ -35,7 +35,7 @@ class Guard:
         name = socket.gethostname().lower()
         self._names = {host.lower(), 'localhost', name, f'{name}.local'}
 
-    def has_camera(self, request: web.Request) -> bool:
+    def has_token(self, request: web.Request) -> bool:
         """Return whether a request brings the token."""
         offered = _protocols(request)
         given = [request.headers.get('X-Token', '')]
@@ -51,11 +51,11 @@ class Guard:
 
     def may_look(self, request: web.Request) -> bool:
         """Return whether a request may see the picture."""
-        return not self.token or self._is_public or self.has_camera(request)
+        return not self.token or self._is_public or self.has_token(request)
 
     def check_token(self, request: web.Request) -> None:
         """Refuse a button pressed without the token."""
-        if self.token and not self.has_camera(request):
+        if self.token and not self.has_token(request):
             raise web.HTTPForbidden(
                 text='the button needs the token that was printed when the viewer started'
             )

@@ -94,7 +94,7 @@ class ViewerServer:
             raise SettingError(refusal(settings.host, settings.port, error)) from error
 
     def stop(self) -> None:
-        """Say goodbye to every browser and end the thread."""
+        """Close every connection and end the thread."""
         if self._loop.is_closed():
             return
         asyncio.run_coroutine_threadsafe(self._close(), self._loop).result()

@@ -11,7 +11,7 @@ from aiohttp import WSCloseCode, web
 from fisheye_core.errors import FisheyeError
 from panorama_viewer.address import is_loopback
 from panorama_viewer.audience import Audience
-from panorama_viewer.browser import Browser, Picture, dismiss
+from panorama_viewer.browser import Browser, TimedJpeg, dismiss
 from panorama_viewer.gate import Gate
 from panorama_viewer.guard import HEADERS, SUBPROTOCOL, Guard
 from panorama_viewer.pages import pages
@@ -56,7 +56,7 @@ class Site:
         self._calibrate, self._watched = calibrate, watched
         self._guard = Guard(settings.host, self.token, settings.public)
         self._stale_after_s = settings.stale_after_s
-        self._picture: Picture | None = None
+        self._picture: TimedJpeg | None = None
         self._state: dict[str, Any] = {
             'stale_after_s': settings.stale_after_s,
             'needs_token': bool(self.token),
@@ -76,7 +76,7 @@ class Site:
 
     def show(self, jpeg: bytes) -> None:
         """Show a picture in every browser that is ready for one."""
-        self._picture = Picture(jpeg, asyncio.get_running_loop().time())
+        self._picture = TimedJpeg(jpeg, asyncio.get_running_loop().time())
         self._wake()
 
     def tell(self, state: dict[str, Any]) -> None:
@@ -85,7 +85,7 @@ class Site:
         self._wake()
 
     async def close(self) -> None:
-        """Say goodbye to every browser."""
+        """Close the connection to every browser."""
         await asyncio.gather(*(browser.close() for browser in self.browsers))
 
     def _audience_changed(self) -> None:
@@ -97,7 +97,7 @@ class Site:
         for browser in self.browsers:
             browser.wake()
 
-    def _fresh(self) -> Picture | None:
+    def _fresh(self) -> TimedJpeg | None:
         """Return the newest picture if it is not stale."""
         now_s = asyncio.get_running_loop().time()
         if self._picture and now_s - self._picture.came_s < self._stale_after_s:
@@ -120,7 +120,7 @@ class Site:
             sentence = 'looking needs the token that was printed when the viewer started'
             await dismiss(stream, connection, WSCloseCode.POLICY_VIOLATION, sentence)
             return stream
-        is_known = self._guard.has_camera(request)
+        is_known = self._guard.has_token(request)
         browser = Browser(stream, connection, lambda: self._state, self._fresh, is_known=is_known)
         if not self.browsers.enter(browser):
             sentence = f'{len(self.browsers)} browsers look already, which is the limit'
@@ -134,7 +134,7 @@ class Site:
         return stream
 
     async def _calibration(self, request: web.Request) -> web.Response:
-        """Have the overlap measured and say how it went."""
+        """Request a calibration and describe its outcome."""
         self._check_button(request, _CALIBRATION_TIMEOUT_S + _CLOSE_S)
         try:
             waiting = asyncio.wrap_future(self._calibrate())
@@ -155,7 +155,7 @@ class Site:
         """Refuse who may not press it, and give who may the time for it."""
         self._guard.check_token(request)
         connection = self._gate.connection(request)
-        if self._guard.has_camera(request):
+        if self._guard.has_token(request):
             self._gate.know(connection)
         connection.set_deadline(seconds)
 

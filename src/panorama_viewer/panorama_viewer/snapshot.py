@@ -81,7 +81,7 @@ def save(path: Path, form: str, image: np.ndarray, surface: Surface, stamp_ns: i
 
 
 def gpano(image: np.ndarray, surface: Surface) -> bytes:
-    """Give an equirectangular JPEG of a panorama, with its GPano tags.
+    """Return an equirectangular JPEG of a panorama, with its GPano tags.
 
     The tags are those of Google's Photo Sphere XMP Metadata.
     """

@@ -5,6 +5,7 @@ import sys
 from math import inf
 from pathlib import Path
 
+import numpy as np
 from fisheye_msgs.msg import Projection
 from rclpy.node import Node
 
@@ -16,6 +17,7 @@ from fisheye_bridge.stamps import ns_of
 from fisheye_bridge.topics import ImageSubscription
 from fisheye_core.encodings import to_opencv
 from fisheye_core.errors import FisheyeError, SettingError, SourceError
+from fisheye_geometry.surface import Surface
 from panorama_viewer.snapshot import FORMATS, save
 
 
@@ -30,8 +32,8 @@ class SnapshotNode(Node):
 
     def __init__(self, **kwargs):
         super().__init__('snapshot', **kwargs)
-        self.taken = None
-        self._surface = None
+        self.taken: tuple[np.ndarray, Surface, int] | None = None
+        self._surface: Surface | None = None
         self.create_subscription(Projection, 'panorama/projection', self._place, LATCHED)
         self._image = ImageSubscription(self, 'panorama/image', self._take)
 
@@ -44,9 +46,10 @@ class SnapshotNode(Node):
         if surface and image.shape[1::-1] == (surface.width, surface.height):
             self.taken = to_opencv(image, encoding), surface, ns_of(header.stamp)
 
-    def wait(self, timeout_s: float) -> tuple:
+    def wait(self, timeout_s: float) -> tuple[np.ndarray, Surface, int]:
         """Spin until a panorama was taken; a `SourceError` if none comes."""
-        if not spin_until(self, lambda: self.taken is not None, timeout_s):
+        spin_until(self, lambda: self.taken is not None, timeout_s)
+        if self.taken is None:
             topic = self.resolve_topic_name('panorama/image')
             raise SourceError(f'no panorama came on {topic} within {timeout_s:g} s')
         return self.taken

@@ -54,7 +54,7 @@ class ViewerStatus:
             self._words[name] = _Word(now_s, level, message, values)
 
     def told(self, now_s: float) -> dict[str, Any]:
-        """Give rate (Hz), delay and skew (ms; None where not known), and what is wrong."""
+        """Return rate (Hz), delay and skew (ms; None where not known), and what is wrong."""
         times, delays = self._recent(now_s)
         rate_hz = (len(times) - 1) / (times[-1] - times[0]) if len(times) > 1 else 0.0
         return {
@@ -95,14 +95,14 @@ class ViewerStatus:
 
 
 def plain(name: str) -> str:
-    """Say what a node does: 'Left camera' for 'left/capture'."""
+    """Return a readable name for a node: 'Left camera' for 'left/capture'."""
     camera, _, role = name.rpartition('/')
     words = _ROLES[role].format(camera).replace('  ', ' ').strip()
     return words[:1].upper() + words[1:]
 
 
 def measured(overlap: Mapping[str, Any]) -> str:
-    """Say what a calibration found for a pair of cameras."""
+    """Describe what a calibration found for a pair of cameras."""
     pair = '{left} and {right}'.format(**overlap)
     if not overlap['found']:
         return f'{pair} show nothing in common'

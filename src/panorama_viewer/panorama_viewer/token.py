@@ -10,6 +10,7 @@ from fisheye_core.errors import FileAccessError, FileContentError
 
 _ACTION = 'used as token_file'
 _LONGEST = 200
+_NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL
 _TOKEN = re.compile(r'[\w-]{8,100}', re.ASCII)
 
 
@@ -31,7 +32,7 @@ def kept_token(path: Path) -> str:
     try:
         try:
             token = new_token()
-            with open(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), 'w') as file:
+            with os.fdopen(os.open(path, _NEW, 0o600), 'w') as file:
                 file.write(f'{token}\n')
             return token
         except FileExistsError:
@@ -42,7 +43,7 @@ def kept_token(path: Path) -> str:
 
 def _read(path: Path) -> str:
     # Without O_NONBLOCK a named pipe would be waited for.
-    with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), 'rb') as file:
+    with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK), 'rb') as file:
         mode = os.fstat(file.fileno()).st_mode
         if not stat.S_ISREG(mode):
             raise FileAccessError(path, _ACTION, 'it is not a regular file')
@@ -60,7 +61,7 @@ def _read(path: Path) -> str:
 def print_on_terminal(sentence: str) -> bool:
     """Print where a person sits, past every log; return whether there is such a place."""
     try:
-        with open('/dev/tty', 'w') as terminal:
+        with Path('/dev/tty').open('w') as terminal:
             terminal.write(f'{sentence}\n')
     except OSError:
         return False

@@ -65,7 +65,7 @@ class ViewerNode(Node):
         return self._server.url
 
     def destroy_node(self) -> None:
-        """Say goodbye to the browsers too."""
+        """Close the connections to browsers too."""
         self._server.stop()
         super().destroy_node()
 
@@ -132,7 +132,7 @@ class ViewerNode(Node):
         """Ask the stitch node to measure; called in the server's thread."""
         if not self._client.service_is_ready():
             raise OverlapError('nobody offers calibrate_overlap: is the stitch node running?')
-        said = Future()
+        said: Future[str] = Future()
         asked = self._client.call_async(
             CalibrateOverlap.Request(save=self._declared.settings.save)
         )

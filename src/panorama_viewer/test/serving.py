@@ -30,7 +30,7 @@ def address(server, path=''):
 
 
 def here(server, path=''):
-    """Give an address of a server that serves other machines, as this machine reaches it."""
+    """Return an address of a server that serves other machines, as this machine reaches it."""
     return f'http://127.0.0.1:{server.address.rpartition(":")[2]}{path}'
 
 

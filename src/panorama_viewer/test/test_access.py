@@ -30,7 +30,7 @@ def token(server):
 
 
 async def farewell(stream):
-    """Give the code and the reason with which the server ends a connection."""
+    """Return the code and the reason with which the server ends a connection."""
     while (message := await stream.receive()).type is not aiohttp.WSMsgType.CLOSE:
         assert not stream.closed, 'it ended without a word'
     return message.data, message.extra

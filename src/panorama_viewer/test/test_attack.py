@@ -48,7 +48,7 @@ class Served:
 
 @pytest.fixture
 def serve():
-    """Give a function that starts a server, which must have had no fault and no log at the end."""
+    """Return a function that starts a server, which must end without a fault and a log."""
     servers = []
 
     def run(**settings):

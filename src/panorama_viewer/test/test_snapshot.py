@@ -33,7 +33,7 @@ def spotted(surface, direction):
 
 
 def xmp(jpeg):
-    """Give the GPano tags of a JPEG by walking its segments."""
+    """Return the GPano tags of a JPEG by walking its segments."""
     at = 2
     while jpeg[at : at + 2] != b'\xff\xda':
         length = int.from_bytes(jpeg[at + 2 : at + 4], 'big')

@@ -61,7 +61,7 @@ class Stitching(Node):
 
 @pytest.fixture
 def ros():
-    """Give a context whose nodes, once added to the executor, spin in a thread."""
+    """Return a context whose nodes, once added to the executor, spin in a thread."""
 
     class Ros:
         context = rclpy.Context()
@@ -121,13 +121,14 @@ def visit(scenario):
 
 
 def look(node):
-    """Give the first picture that a browser is shown."""
+    """Return the first picture that a browser is shown."""
 
     async def look(session):
         async with session.ws_connect(f'{node.url}live') as stream:
             async for message in stream:
                 if message.type is aiohttp.WSMsgType.BINARY:
                     return message.data
+        return pytest.fail('the stream ended without a picture')
 
     return visit(look)
 
@@ -164,6 +165,7 @@ def test_the_page_is_told_what_the_rig_says(ros):
                 told = json.loads(message.data)
                 if all(told.get(key) for key in ('projection', 'overlaps', 'problems', 'rate_hz')):
                     return told
+        return pytest.fail('the stream ended before all was told')
 
     told = visit(hear)
     assert told['projection']['surface'] == 'cylindrical'
@@ -204,6 +206,7 @@ def test_the_delay_of_a_recording_goes_by_its_own_time(ros):
                     told = json.loads(message.data)
                     if told.get('delay_ms') is not None:
                         return told
+        return pytest.fail('the stream ended without a delay')
 
     assert -100 <= visit(hear)['delay_ms'] < 1000 * DEADLINE_S
 
