@@ -36,8 +36,8 @@ bench bench-%: export PYTHONPATH := tools:src/fisheye_undistort/test:$(PYTHONPAT
 docs: build ## write the parameter tables of docs/ anew
 	@$(run) python tools/parameter_tables.py
 
-lint: .venv/.done ## check style and format
-	@source .venv/local_setup.bash && ruff check . && ruff format --check .
+lint: .venv/.done ## check style, format and types
+	@source .venv/local_setup.bash && ruff check . && ruff format --check . && mypy
 
 clean: ## remove everything that the targets above made
 	rm -rf .venv build install log out

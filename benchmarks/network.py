@@ -24,7 +24,7 @@ from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.camera_file import Camera, write_camera
 from fisheye_testing import network_camera
 from fisheye_testing.painted_time import BLOCKS, age_ms, centres_px, read
-from fisheye_testing.rig import SIDES, Rig, unused_domain, wait_for
+from fisheye_testing.rig import SIDES, RigProcesses, unused_domain, wait_for
 from fisheye_testing.watcher import Watcher
 
 SIZE = 640, 480
@@ -83,7 +83,7 @@ def measure(kind: str, rate_hz: float, seconds: float, is_slow: bool):
             own |= {f'{side}.{name}': value for name, value in parameters.items()}
         own['offset_x_px'] = f'[{OFFSET_PX}]'
         domain = unused_domain()
-        with Rig(domain, Path(folder, 'log')) as rig, Ages(domain, lens) as ages:
+        with RigProcesses(domain, Path(folder, 'log')) as rig, Ages(domain, lens) as ages:
             rig.start('panorama', frame_rate_hz=rate_hz, **own)
             wait_for(lambda: len(ages.true_ms) > 2 * rate_hz, 60, f'panoramas of {kind}')
             with slowed(rig.processes['panorama'].pid, is_slow):

@@ -23,10 +23,10 @@ _LIBJPEG = (
 """How its lines begin (the warnings of jerror.h)."""
 
 
-class _Guard:
+class _StderrFilter:
     """Holds standard error back while anybody decodes, and passes on what is not libjpeg's."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._lock = Lock()
         self._decoding = 0
         self._held = self._stderr = -1
@@ -54,7 +54,7 @@ class _Guard:
                     os.ftruncate(self._held, 0)
                     self._passed = 0
 
-    def _pass_on(self):
+    def _pass_on(self) -> None:
         size = os.fstat(self._held).st_size
         if size == self._passed:
             return
@@ -65,14 +65,14 @@ class _Guard:
             os.write(self._stderr, others)
 
 
-_guard = _Guard()
+_stderr_filter = _StderrFilter()
 
 
 @contextmanager
 def without_libjpeg_lines() -> Iterator[None]:
     """Keep what libjpeg says from standard error; what others say meanwhile comes behind."""
     try:
-        _guard.enter()
+        _stderr_filter.enter()
     except OSError:  # There is no standard error, or no more files may be opened.
         yield
         return
@@ -80,4 +80,4 @@ def without_libjpeg_lines() -> Iterator[None]:
         yield
     finally:
         with suppress(OSError):
-            _guard.leave()
+            _stderr_filter.leave()

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fisheye_testing.free_running import Camera, pair_frames
+from fisheye_testing.free_running import CameraTiming, pair_frames
 from panorama_stitch.pipeline.pairing import FramePairing
 
 MS = 1_000_000
@@ -119,8 +119,8 @@ phases = st.floats(0.0, 1.0)
 def test_cameras_of_one_rate_lose_no_frame_at_any_phase(rate_hz, phase, jitter, seed):
     period_ms = 1000 / rate_hz
     cameras = [
-        Camera(rate_hz, 0.0, jitter * period_ms),
-        Camera(rate_hz, phase * period_ms, jitter * period_ms),
+        CameraTiming(rate_hz, 0.0, jitter * period_ms),
+        CameraTiming(rate_hz, phase * period_ms, jitter * period_ms),
     ]
     paired = pair_frames(FramePairing, cameras, seconds=10.0, seed=seed)
     assert paired.share > ENOUGH
@@ -132,8 +132,8 @@ def test_cameras_of_one_rate_lose_no_frame_at_any_phase(rate_hz, phase, jitter, 
 def test_the_slower_camera_sets_the_rate(rate_hz, slower, phase, jitter, seed):
     period_ms = 1000 / rate_hz
     cameras = [
-        Camera(rate_hz, 0.0, jitter * period_ms),
-        Camera(rate_hz * slower, phase * period_ms, jitter * period_ms),
+        CameraTiming(rate_hz, 0.0, jitter * period_ms),
+        CameraTiming(rate_hz * slower, phase * period_ms, jitter * period_ms),
     ]
     paired = pair_frames(FramePairing, cameras, seconds=10.0, seed=seed)
     assert paired.share > ENOUGH
@@ -144,7 +144,7 @@ def test_the_slower_camera_sets_the_rate(rate_hz, slower, phase, jitter, seed):
 @given(st.lists(st.floats(20.0, 40.0), min_size=3, max_size=3), phases, phases, st.integers(0, 9))
 def test_three_free_cameras_lose_no_frame(rates_hz, second, third, seed):
     cameras = [
-        Camera(rate, phase * 1000 / rate, 1.0)
+        CameraTiming(rate, phase * 1000 / rate, 1.0)
         for rate, phase in zip(rates_hz, (0.0, second, third), strict=True)
     ]
     paired = pair_frames(FramePairing, cameras, seconds=10.0, seed=seed)
@@ -156,13 +156,16 @@ def test_three_free_cameras_lose_no_frame(rates_hz, second, third, seed):
 def test_frames_that_come_late_lose_nothing(rates_hz, phase, seed):
     first, second = rates_hz
     late_ms = 6 * 1000 / max(rates_hz)
-    cameras = [Camera(first, 0.0, 1.0), Camera(second, phase * 33.0, 1.0, late_ms=late_ms)]
+    cameras = [
+        CameraTiming(first, 0.0, 1.0),
+        CameraTiming(second, phase * 33.0, 1.0, late_ms=late_ms),
+    ]
     assert pair_frames(FramePairing, cameras, seconds=10.0, seed=seed).share > ENOUGH
 
 
 @given(phases, st.floats(0.0, 0.1), st.integers(0, 99))
 def test_a_lost_frame_costs_one_group(phase, lost, seed):
-    cameras = [Camera(30, 0.0, 1.0), Camera(30, phase * 33.0, 1.0, lost)]
+    cameras = [CameraTiming(30, 0.0, 1.0), CameraTiming(30, phase * 33.0, 1.0, lost)]
     paired = pair_frames(FramePairing, cameras, seed=seed)
     # Where the frame was lost just as the order of the cameras changed, it is two.
     assert paired.share > ENOUGH - lost
