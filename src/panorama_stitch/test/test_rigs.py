@@ -22,8 +22,11 @@ from panorama_stitch.compose.placing import leads_around, place
 from panorama_stitch.compose.posing import views_of_rig
 from panorama_stitch.compose.view import View
 
-FAITHFUL_DB = 30.0
-"""Two bilinear resamplings of an antialiased scene stay well above it."""
+FAITHFUL_DB = 40.0
+"""A bilinear resampling of an antialiased scene stays above it, and one camera of four that is off
+by half a degree does not."""
+COARSE_DB = 32.0
+"""The inner edge of a mirror's ring has half the resolution."""
 SEAMLESS = 1.5
 """How much more the columns beside the edge of a closed panorama may differ than others do."""
 STAMP_NS = 700_000_000
@@ -78,7 +81,8 @@ def psnr(a, b, where=np.s_[:]):
 @pytest.mark.parametrize('name', RIGS)
 def test_it_shows_the_scene_and_leaves_no_black(name):
     layout, out = composed(*rig(name), Style())
-    assert psnr(out, Scene().view(layout.surface).frame(STAMP_NS)) > FAITHFUL_DB
+    limit_db = COARSE_DB if 'mirror' in name else FAITHFUL_DB
+    assert psnr(out, Scene().view(layout.surface).frame(STAMP_NS)) > limit_db
     assert out.any(axis=2).all()
 
 
@@ -152,7 +156,7 @@ def test_lenses_and_sizes_may_differ():
         images.append(Scene().view(lens, attitude).frame(STAMP_NS))
     layout, out = composed(views, images, False, Style())
     truth = Scene().view(layout.surface).frame(STAMP_NS)
-    assert psnr(out, truth) > FAITHFUL_DB - 3  # the coarser lenses blur
+    assert psnr(out, truth) > COARSE_DB
     assert len(layout.seams) == 2
 
 
@@ -167,7 +171,9 @@ def test_corrected_pictures_of_a_ring_are_copied():
         for view, image in zip(views, corrected, strict=True)
     ]
     layout, out = composed(sources, corrected, wraps, Style())
-    assert psnr(out, Scene().view(layout.surface).frame(STAMP_NS)) > FAITHFUL_DB
+    assert (
+        psnr(out, Scene().view(layout.surface).frame(STAMP_NS)) > FAITHFUL_DB - 3
+    )  # resampled twice
 
 
 @pytest.mark.parametrize('gains', [(1.0, 1.15, 0.9, 1.05)])
@@ -225,5 +231,5 @@ def test_the_robot_itself_is_hidden_where_another_camera_sees_the_place(blend):
     drawn[:, : window.width // 3] = 0
     assert (drawn > 0).sum() > 1000
     assert not is_body[drawn > 0].any(), 'hidden'
-    assert psnr(out, truth, drawn > 0) > FAITHFUL_DB - 5  # its edges are where pixels mix
+    assert psnr(out, truth, drawn > 0) > FAITHFUL_DB - 15  # its edges are where pixels mix
     assert is_body[:, : window.width // 3].sum() > 500, 'nothing else is known of that place'
