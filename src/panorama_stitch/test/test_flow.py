@@ -6,6 +6,7 @@ import pytest
 
 from panorama_stitch.compose.blend import Feather
 from panorama_stitch.compose.flow import Flow
+from panorama_stitch.compose.optical_flow import OpticalFlow
 
 HEIGHT, WIDTH = 300, 112
 FADE = 52, 60
@@ -21,6 +22,7 @@ SHOWN = 0.8, 1.15
 COMING_BACK = 30
 """Frames in which flow fades in again."""
 STEADY = 1.1
+MOST_PIXELS = 80 * 530
 SAME_LEVELS = 3
 """At its edges a view has hardly been warped."""
 
@@ -186,3 +188,9 @@ def test_strips_of_any_size(size):
 def test_where_no_view_shows_anything_it_stays_black():
     nothing, image = np.zeros((90, 64), bool), np.zeros((90, 64, 3), np.uint8)
     assert not blended(Flow(nothing, nothing), image, image).any()
+
+
+@pytest.mark.parametrize('size', [(117, 506), (234, 1009), (64, 2036), (900, 2000), (20, 300)])
+def test_the_search_costs_about_the_same_whatever_the_size(size):
+    flow = OpticalFlow(*size)
+    assert flow.width * flow.height <= MOST_PIXELS

@@ -7,6 +7,8 @@ from fisheye_core.parallel import run_parallel
 
 _COLUMNS = 56
 """Views are reduced to so many columns, half of those of 30 degrees from 640x480 px."""
+_MOST_ROWS = 500
+"""Nor do they keep more rows than about these: narrow overlaps of large pictures take no longer."""
 _LEAST_SIDE = 80
 """Smaller ones get a border: the coarsest picture of the search is an eighth of their size."""
 _FINEST_SCALE = 1
@@ -44,7 +46,7 @@ class OpticalFlow:
 
     def __init__(self, width: int, height: int):
         """Prepare for views of `width` times `height` px."""
-        factor = max(1, round(width / _COLUMNS))
+        factor = max(1, round(width / _COLUMNS), round(height / _MOST_ROWS))
         self._size = max(1, width // factor), max(1, height // factor)
         self._whole = np.s_[: self._size[1] * factor, : self._size[0] * factor]
         self.width, self.height = (max(side, _LEAST_SIDE) for side in self._size)
