@@ -263,3 +263,26 @@ def test_grey_pictures_give_a_grey_panorama(pictures):
     layout = lay_out(placed, fade_px=10.0, crop='valid')
     _, _, out = drawn(layout, placed, grey)
     assert out.min() > 0
+
+
+@pytest.mark.parametrize('corrected', [False, True])
+@pytest.mark.parametrize('is_grey', [False, True])
+def test_flow_shows_the_scene_and_fades_where_it_may_not_or_has_no_time(
+    pictures, corrected, is_grey
+):
+    views, images = views_of(pictures, corrected)
+    if is_grey:
+        images = [cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) for image in images]
+    placed = placed_at(views, (round(OFFSET), 0))
+    layout = lay_out(placed, fade_px=10.0, crop='valid')
+    shape = (layout.surface.height, layout.surface.width, *images[0].shape[2:])
+    out, faded = np.empty(shape, np.uint8), np.empty(shape, np.uint8)
+    compositor, feather = Compositor(layout, placed, 'flow'), Compositor(layout, placed)
+    assert compositor.is_costly
+    assert not feather.is_costly
+    feather.compose(images, faded)
+    compositor.compose(images, out)
+    assert psnr(out, faded, np.s_[:]) > FAITHFUL_DB
+    for options in ({'economical': True}, {'are_live': False}):
+        compositor.compose(images, out, **options)
+        assert np.abs(out.astype(int) - faded).max() <= 1

@@ -185,6 +185,13 @@ def test_strips_of_any_size(size):
     assert (blended(Flow(seen, seen), image, image) == 50).all()
 
 
+@pytest.mark.parametrize('fade', [(0, 0), (WIDTH, WIDTH), (0, WIDTH), (0, 8), (50, 50)])
+def test_fades_anywhere_in_the_strip(fade):
+    left, right = moved(0)
+    out = blended(Flow(EVERYWHERE, EVERYWHERE, fade), left, right)
+    assert np.abs(out.astype(int) - left).max() <= 1
+
+
 def test_where_no_view_shows_anything_it_stays_black():
     nothing, image = np.zeros((90, 64), bool), np.zeros((90, 64, 3), np.uint8)
     assert not blended(Flow(nothing, nothing), image, image).any()

@@ -14,6 +14,7 @@ from fisheye_capture.synthetic import synthetic_lens
 from fisheye_core.errors import FisheyeError
 from fisheye_core.settings import rules
 from fisheye_geometry.attitude import Attitude
+from panorama_stitch.compose.compositor import BLENDS
 from panorama_stitch.pipeline.panorama_settings import PanoramaOutputSettings, PanoramaSettings
 from panorama_stitch.pipeline.rig_state import RigState
 
@@ -91,7 +92,7 @@ def test_random_legal_values_of_every_live_parameter(pictures, seed):
     assert counts['drawn'] > DRAWN * CHANGES / 2, counts
 
 
-@pytest.mark.parametrize('blend', ['none', 'feather', 'multiband'])
+@pytest.mark.parametrize('blend', BLENDS)
 @pytest.mark.parametrize('offset_px', [-29.0, -700.0, -1e4, 0.0, 95.0, 1e4])
 def test_an_offset_to_the_wrong_side_is_drawn(pictures, blend, offset_px):
     settings = PanoramaOutputSettings(blend=blend, offset_x_px=(offset_px,))

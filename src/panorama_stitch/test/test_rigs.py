@@ -17,6 +17,7 @@ from fisheye_geometry.rig import chain
 from fisheye_geometry.rig_solution import solve_rig
 from fisheye_geometry.surface import surface_for
 from panorama_stitch.compose.build import Style, build_compositor
+from panorama_stitch.compose.compositor import BLENDS
 from panorama_stitch.compose.layout import covered
 from panorama_stitch.compose.placing import leads_around, place
 from panorama_stitch.compose.posing import views_of_rig
@@ -204,7 +205,7 @@ def test_the_field_data_follow_the_same_conventions():
 MAGENTA = (255, 0, 255)
 
 
-@pytest.mark.parametrize('blend', ['none', 'feather', 'multiband'])
+@pytest.mark.parametrize('blend', BLENDS)
 def test_the_robot_itself_is_hidden_where_another_camera_sees_the_place(blend):
     yaws = np.radians([-55, 55])
     attitudes = [Attitude(yaw) for yaw in yaws]

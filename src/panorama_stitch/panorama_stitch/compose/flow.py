@@ -192,5 +192,7 @@ class _Warp:
         shape = where.shape[:2] + image.shape[2:]
         if self.drawn.shape != shape:
             self.drawn = np.empty(shape, np.uint8)
+        if not self.drawn.size:
+            return
         border = {'borderMode': cv2.BORDER_REPLICATE}
         cv2.remap(image, where, None, cv2.INTER_LINEAR, dst=self.drawn, **border)

@@ -8,7 +8,7 @@ from fisheye_core.parallel import run_parallel
 _COLUMNS = 56
 """Views are reduced to so many columns, half of those of 30 degrees from 640x480 px."""
 _MOST_ROWS = 500
-"""Nor do they keep more rows than about these: narrow overlaps of large pictures take no longer."""
+"""Nor do they keep many more rows: narrow overlaps of large pictures take no longer."""
 _LEAST_SIDE = 80
 """Smaller ones get a border: the coarsest picture of the search is an eighth of their size."""
 _FINEST_SCALE = 1
