@@ -1,9 +1,8 @@
-"""How well the overlap of two views is found: right, wrong, missed and false, for each method.
+"""How well the rotation between two cameras is found, and what its confidence is worth.
 
-The rigs are real pictures with a known truth, random ones (see rigs.py), and pairs that share no
-scene: random ones, and left and right views of different real places. An answer is right within
-half a degree. The time is that of one measurement, in ms and as a multiple of one
-`cv2.matchTemplate` of the same facing halves over all offsets, on one core.
+The rigs are real pictures with a known truth, random ones with things near, bodies and tilt (see
+rigs.py), and pairs that share no scene. An answer is right within half a degree. Times are of one
+measurement on one core.
 """
 
 import argparse
@@ -11,174 +10,154 @@ import json
 import sys
 import time
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
-from math import degrees, nan, radians
+from dataclasses import asdict, dataclass, field
+from itertools import pairwise
 from pathlib import Path
 
 import cv2
 import numpy as np
 from overlap_cases import Case, cases
-from overlap_picture import draw
 
-from panorama_stitch.overlap.measure_overlap import (
-    METHODS,
-    Overlap,
-    OverlapSettings,
-    measure_overlap,
-)
-from panorama_stitch.overlap.particles import facing_halves
+from panorama_stitch.overlap.measure import MIN_CONFIDENCE, measure_rotation
 
 FIRST_SEED = 5000
-RIGHT_DEG, RIG_DEG, SHARE = 0.5, 0.35, 0.99
-TIMES = 4.0
-"""At most so many times one matchTemplate."""
-RISE_PX = 20
-PICTURES = 20
-"""So many of each group are drawn."""
+RIGHT_DEG, WRONG_DEG, SURE = 0.5, 1.0, 0.8
+SHARE, FALSE_SHARE = 0.97, 0.005
 
 
 @dataclass(frozen=True)
-class CaseResult:
-    """What one method said of one case; NaN where there is nothing to compare with."""
+class Result:
+    """What was measured of one case; the error is NaN where there is no truth."""
 
     group: str
     name: str
-    method: str
-    decided: str
-    expected: bool
+    common: bool
     found: bool
-    offset_deg: float
-    error_px: float
     error_deg: float
     confidence: float
+    limit: str
     ms: float
-    times: float
-    message: str
+    evidence: dict = field(default_factory=dict)
+
+    @property
+    def is_right(self) -> bool:
+        """Whether it is within half a degree; False where there is no truth."""
+        return self.error_deg <= RIGHT_DEG
 
 
 def main() -> int:
-    """Print the table and write out/overlap.json; 1 if `particles` misses a target."""
+    """Print the table, write out/overlap.json and the curve; 1 where a target is missed."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('--out', type=Path, default=Path('out'), help='where results go')
-    parser.add_argument('--pictures', type=Path, help='draw what was found into this folder')
     parser.add_argument('--quick', action='store_true', help='a tenth of the random rigs')
     parser.add_argument('--seed', type=int, default=FIRST_SEED, help='of the first random rig')
     options = parser.parse_args()
     cv2.setNumThreads(1)
-    count = 10 if options.quick else 100
-    results, drawn = [], {}
-    for case in cases(options.seed, count):
-        template_ms = min(_timed(_match_template, case)[1] for _ in range(2))
-        for method in METHODS:
-            overlap, ms = _timed(_measure, case, method)
-            results.append(_compare(case, method, overlap, ms, ms / template_ms))
-            drawn[case.group] = drawn.get(case.group, 0) + 1
-            if options.pictures and drawn[case.group] <= len(METHODS) * PICTURES:
-                options.pictures.mkdir(parents=True, exist_ok=True)
-                path = options.pictures / f'{case.group} {case.name} {method}.jpg'.replace(
-                    ' ', '_'
-                )
-                cv2.imwrite(str(path), draw(case.pictures, case.surfaces, overlap))
+    rigs, apart = (60, 20) if options.quick else (600, 200)
     options.out.mkdir(parents=True, exist_ok=True)
-    report = [asdict(result) for result in results]
-    (options.out / 'overlap.json').write_text(json.dumps(report, indent=1))
+    results = []
+    with (options.out / 'overlap.jsonl').open('w') as lines:
+        for case in cases(options.seed, rigs, apart):
+            results.append(measured(case))
+            lines.write(json.dumps(asdict(results[-1])) + '\n')
+            lines.flush()
+    return report(results, options.out)
+
+
+def report(results: list[Result], out: Path) -> int:
+    """Print the table and what is missed, and draw the curve."""
     _print_table(results)
+    draw_curve(results, out / 'overlap_confidence.png')
     complaints = list(_complaints(results))
     print(*complaints, sep='\n')
     return 1 if complaints else 0
 
 
-def _measure(case: Case, method: str) -> Overlap:
-    return measure_overlap([case.pictures], *case.surfaces, OverlapSettings(), method)
-
-
-def _match_template(case: Case) -> None:
-    left, right = facing_halves(*case.pictures)
-    rows = max(RISE_PX, right.shape[0] - left.shape[0])
-    edges = rows, rows, right.shape[1], right.shape[1]
-    cv2.matchTemplate(
-        cv2.copyMakeBorder(left, *edges, cv2.BORDER_CONSTANT), right, cv2.TM_CCOEFF_NORMED
-    )
-
-
-def _timed(function, *arguments):
-    """Return a result and the processor time it took, ms; other programs do not count."""
+def measured(case: Case) -> Result:
+    """Measure one case."""
     start = time.process_time()
-    result = function(*arguments)
-    return result, (time.process_time() - start) * 1e3
-
-
-def _compare(case: Case, method: str, overlap: Overlap, ms: float, times: float) -> CaseResult:
-    left, right = case.surfaces
-    error_px = error_deg = nan
-    level = left.center_x_px - right.center_x_px
-    if case.offset_deg is not None and overlap.found:
-        error_px = overlap.offset_x_px - level - left.focal_px * radians(case.offset_deg)
-        error_deg = degrees(error_px / left.focal_px)
-    return CaseResult(
+    result = measure_rotation([(case.left, case.right)])
+    ms = (time.process_time() - start) * 1e3
+    error = np.nan
+    if case.rotation is not None:
+        error = 180.0
+        if result.rotation is not None:
+            error = np.degrees((case.rotation.inv() * result.rotation).magnitude())
+    return Result(
         group=case.group,
         name=case.name,
-        method=method,
-        decided=overlap.method,
-        expected=case.overlaps,
-        found=overlap.found,
-        offset_deg=degrees((overlap.offset_x_px - level) / left.focal_px),
-        error_px=error_px,
-        error_deg=error_deg,
-        confidence=overlap.confidence,
+        common=case.common,
+        found=result.found,
+        error_deg=float(error),
+        confidence=result.confidence,
+        limit=result.limit,
         ms=ms,
-        times=times,
-        message=overlap.message,
+        evidence=asdict(result.evidence) if result.evidence else {},
     )
 
 
-def _print_table(results: list[CaseResult]) -> None:
+def _print_table(results):
     print(
-        'method      rigs         number  in 1 px  in 0.5 deg  worst deg  missed  false'
-        '      ms  times matchTemplate'
+        'rigs             number  right  right and found  found wrong  sure and wrong  median ms'
     )
-    for method in METHODS:
-        for group in dict.fromkeys(result.group for result in results):
-            of = [r for r in results if (r.method, r.group) == (method, group)]
-            known = [r for r in of if r.error_deg == r.error_deg or (not r.found and r.expected)]
-            errors = np.array([r.error_deg for r in known if r.found])
-            shares = [
-                f'{np.mean([r.found and abs(getattr(r, key)) <= most for r in known]):8.1%}'
-                if known and of[0].expected
-                else '       -'
-                for key, most in (('error_px', 1.0), ('error_deg', RIGHT_DEG))
-            ]
-            worst = (
-                f'{np.abs(errors).max():9.2f}' if len(errors) and of[0].expected else '        -'
-            )
-            print(
-                f'{method:11} {group:11} {len(of):7} {shares[0]}  {shares[1]:>10}  {worst}  '
-                f'{sum(r.expected and not r.found for r in of):6}  '
-                f'{sum(r.found and not r.expected for r in of):5}  '
-                f'{np.median([r.ms for r in of]):6.1f}  {np.median([r.times for r in of]):6.2f}'
-            )
+    for group in dict.fromkeys(result.group for result in results):
+        of = [r for r in results if r.group == group]
+        known = [r for r in of if r.error_deg == r.error_deg]
+        right = f'{np.mean([r.is_right for r in known]):6.1%}' if known else '     -'
+        both = f'{np.mean([r.is_right and r.found for r in known]):6.1%}' if known else '     -'
+        wrong = sum(r.found and not r.is_right for r in known) + sum(
+            r.found and not r.common for r in of
+        )
+        sure = sum(r.confidence >= SURE and r.error_deg > WRONG_DEG for r in known)
+        ms = np.median([r.ms for r in of])
+        print(f'{group:15} {len(of):7} {right}  {both:>15} {wrong:12} {sure:15} {ms:10.0f}')
 
 
-def _complaints(results: list[CaseResult]) -> Iterator[str]:
-    """Yield the targets that `particles` misses."""
-    mine = [r for r in results if r.method == 'particles']
-    wide = [r for r in mine if r.group == 'random']
-    right = np.mean([r.found and abs(r.error_deg) <= RIGHT_DEG for r in wide])
+def _complaints(results) -> Iterator[str]:
+    able = [r for r in results if r.group.startswith('wide')]
+    right = np.mean([r.is_right for r in able])
     if right < SHARE:
-        yield f'{right:.1%} of the random rigs are right; {SHARE:.0%} are asked'
-    for r in mine:
+        yield f'{right:.1%} of the wide random rigs are right; {SHARE:.0%} are asked'
+    for r in results:
+        if r.confidence >= SURE and r.error_deg > WRONG_DEG:
+            yield f'{r.name} is off by {r.error_deg:.1f} degrees at {r.confidence:.2f}'
+        if r.group == 'field' and not (r.is_right and r.found):
+            yield f'{r.name} is off by {r.error_deg:.2f} degrees at {r.confidence:.2f}'
         if r.group == 'real apart' and r.found:
-            yield f'{r.name} have no common scene; found {r.offset_deg:.2f} degrees'
-        if r.group == 'real' and not (r.found and not abs(r.error_deg) > RIG_DEG):
-            yield f'{r.name} is off by {r.error_deg:.2f} degrees; {RIG_DEG} are allowed'
-    shun = [r for r in mine if r.name.startswith('shun74')]
-    middle = np.median([r.offset_deg for r in shun]) if shun else nan
-    for r in shun:
-        if abs(r.offset_deg - middle) > RIGHT_DEG:
-            yield f'{r.name} is {r.offset_deg - middle:.2f} degrees from the median of its rig'
-    times = np.median([r.times for r in mine])
-    if times > TIMES:
-        yield f'particles take {times:.1f} times one matchTemplate; {TIMES:g} are allowed'
+            yield f'{r.name} have no common scene; found at {r.confidence:.2f}'
+    apart = [r for r in results if r.group == 'apart']
+    found = sum(r.found for r in apart)
+    if found > FALSE_SHARE * len(apart):
+        yield f'{found} of {len(apart)} random pairs without a common scene are found'
+
+
+def draw_curve(results: list[Result], path: Path) -> None:
+    """Draw how many of the answers of one confidence are right."""
+    import matplotlib
+
+    matplotlib.use('Agg')
+    from matplotlib import pyplot
+
+    random = [r for r in results if r.group.startswith(('wide', 'narrow'))]
+    random += [r for r in results if r.group == 'apart']
+    told = np.array([r.confidence for r in random])
+    right = np.array([r.is_right for r in random], float)
+    edges = np.array([0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95, 1.001])
+    figure, axes = pyplot.subplots(figsize=(5, 4.5))
+    axes.plot([0, 1], [0, 1], color='0.7', linewidth=1)
+    for low, high in pairwise(edges):
+        inside = (told >= low) & (told < high)
+        if not inside.any():
+            continue
+        count, share = int(inside.sum()), right[inside].mean()
+        deviation = np.sqrt((share * count + 1) * (count - share * count + 1) / (count + 2) ** 3)
+        axes.errorbar(told[inside].mean(), share, deviation, fmt='o', color='C0', capsize=3)
+        axes.annotate(f' {count}', (told[inside].mean(), share), va='top')
+    axes.axvline(MIN_CONFIDENCE, color='C1', linestyle=':')
+    axes.set(xlabel='confidence', ylabel='share within 0.5 degrees', xlim=(0, 1), ylim=(0, 1.02))
+    figure.tight_layout()
+    figure.savefig(path, dpi=110)
+    pyplot.close(figure)
 
 
 if __name__ == '__main__':

@@ -1,95 +1,92 @@
-"""The pairs of views on which overlap calibration is measured, and the truth about them."""
+"""What the overlap is measured on: real rigs, random ones, and pairs without a common scene."""
 
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import permutations
+from itertools import pairwise, permutations
+from pathlib import Path
 
 import cv2
 import numpy as np
-from pairs import DATA, folder_pair, synthetic_pair
+from pairs import DATA
 from rigs import random_rig
+from scipy.spatial.transform import Rotation
 
-from fisheye_geometry.surface import Surface, surface_for
-from panorama_stitch.compose.view import View
+from fisheye_geometry.camera_file import read_camera
+from panorama_stitch.overlap.view import View
 
-WIDE_DEG = 15.0
-"""Overlaps at least this wide must be found."""
+WIDE_DEG, FAR_SHARE = 15.0, 1 / 3
+"""Rigs on which the rotation must be found: so much overlap, and so much of it far."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """Two corrected pictures (height, width) uint8 and the truth; `offset_deg` None if unknown."""
+    """A pair of views; `rotation` is None where there is no truth."""
 
     group: str
     name: str
-    pictures: tuple[np.ndarray, np.ndarray]
-    surfaces: tuple[Surface, Surface]
-    offset_deg: float | None
-    overlaps: bool
+    left: View
+    right: View
+    rotation: Rotation | None
+    common: bool = True
 
 
-def cases(seed: int, count: int) -> Iterator[Case]:
-    """Return the real rigs, then `count` times three random ones and `count` without overlap."""
-    yield _synthetic()
+def cases(seed: int, rigs: int, apart: int) -> Iterator[Case]:
+    """Return the real rigs, `rigs` random ones, and `apart` pairs without a common scene."""
+    yield from _field()
     yield from _real()
-    for i in range(3 * count):
-        yield _random(seed + i, overlaps=True)
-    for i in range(count):
-        yield _random(seed + i, overlaps=False)
+    for i in range(rigs):
+        yield _random(seed + i, common=True)
+    for i in range(apart):
+        yield _random(seed + i, common=False)
 
 
-def _synthetic() -> Case:
-    pair = synthetic_pair(640, 480)
-    return _case('real', pair.name, pair.lenses, pair.images, 'cylindrical', 140.0, True)
+def _field() -> Iterator[Case]:
+    for path in sorted((DATA / 'field').glob('*/truth.json')):
+        truth = json.loads(path.read_text())
+        cameras = truth['cameras']
+        attitudes = {
+            name: Rotation.from_matrix(np.reshape(rows, (3, 3)))
+            for name, rows in truth['attitude'].items()
+        }
+        neighbours = list(pairwise(cameras))
+        if truth['closed'] and len(cameras) > 2:
+            neighbours.append((cameras[-1], cameras[0]))
+        for left, right in neighbours:
+            views = [_view(path.parent, camera) for camera in (left, right)]
+            rotation = attitudes[left].inv() * attitudes[right]
+            yield Case('field', f'{path.parent.name} {left} {right}', *views, rotation)
 
 
 def _real() -> Iterator[Case]:
-    """Return the rigs of real pictures, and what the left and right views of two places make."""
-    folders = [path.parent for path in sorted((DATA / 'rigs').glob('*/truth.json'))]
-    if not folders:
-        print('No rigs of real pictures are there; set FISHEYE_DATA to their folder.')
-    pairs = {}
-    for folder in folders:
-        truth = json.loads((folder / 'truth.json').read_text())
-        pair = folder_pair(folder)
-        group = 'real' if truth['overlaps'] else 'real apart'
-        yield _case(
-            group,
-            pair.name,
-            pair.lenses,
-            pair.images,
-            'cylindrical',
-            truth['offset_deg'],
-            truth['overlaps'],
-        )
-        if truth['overlaps'] and truth['offset_deg']:
-            pairs[pair.name] = pair
-    for one, other in permutations(pairs, 2):
-        left, right = pairs[one], pairs[other]
-        yield _case(
-            'real apart',
-            f'{one} and {other}',
-            (left.lenses[0], right.lenses[1]),
-            (left.images[0], right.images[1]),
-            'cylindrical',
-            None,
-            False,
-        )
+    """Pairs of real pictures, and what the left and right views of two places make."""
+    views = {}
+    for path in sorted((DATA / 'rigs').glob('*/truth.json')):
+        truth, name = json.loads(path.read_text()), path.parent.name
+        left, right = (_view(path.parent, side) for side in ('left', 'right'))
+        if not truth['overlaps']:
+            yield Case('real apart', name, left, right, None, common=False)
+            continue
+        rotation = None
+        if truth['offset_deg']:
+            views[name] = left, right
+            angles = truth['offset_deg'], truth['pitch_deg'], truth['roll_deg']
+            rotation = Rotation.from_euler('YXZ', angles, degrees=True)
+        yield Case('rigs', name, left, right, rotation)
+    for one, other in permutations(views, 2):
+        pair = views[one][0], views[other][1]
+        yield Case('real apart', f'{one} and {other}', *pair, None, common=False)
 
 
-def _random(seed: int, overlaps: bool) -> Case:
-    rig = random_rig(seed, overlaps)
-    group = 'apart' if not overlaps else 'random' if rig.common_deg >= WIDE_DEG else 'narrow'
-    lenses, pictures = (rig.left_lens, rig.right_lens), (rig.left, rig.right)
-    return _case(group, rig.name, lenses, pictures, rig.surface, rig.offset_deg, overlaps)
+def _view(folder: Path, camera: str) -> View:
+    image = cv2.imread(str(folder / f'{camera}.png'), cv2.IMREAD_GRAYSCALE)
+    return View(image, read_camera(folder / f'{camera}.yaml').lens)
 
 
-def _case(group, name, lenses, pictures, kind, offset_deg, overlaps) -> Case:
-    surfaces = [surface_for(lens, kind) for lens in lenses]
-    surfaces[1] = surfaces[1].with_focal(surfaces[0].focal_px)
-    corrected = []
-    for lens, surface, picture in zip(lenses, surfaces, pictures, strict=True):
-        grey = picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
-        corrected.append(View(lens, surface).corrected(grey))
-    return Case(group, name, tuple(corrected), tuple(surfaces), offset_deg, overlaps)
+def _random(seed: int, *, common: bool) -> Case:
+    rig = random_rig(seed, common=common, held_out=True)
+    able = rig.overlap_deg >= WIDE_DEG and rig.far_share >= FAR_SHARE
+    kind = 'near' if rig.about['near'] or rig.about['body'] else 'distant'
+    group = 'apart' if not common else f'wide, {kind}' if able else f'narrow, {kind}'
+    views = (View(rig.left, rig.lenses[0]), View(rig.right, rig.lenses[1]))
+    return Case(group, rig.name, *views, rig.rotation if common else None, common)

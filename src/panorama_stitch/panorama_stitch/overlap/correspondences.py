@@ -13,7 +13,7 @@ _RATIO = 0.92
 _SAME_PLACE_PX = 4.0
 """Rivals nearer than it are the same feature found twice."""
 _STATIC_PX = 3.0
-_BODY_SHARE = 0.01
+_SAME, _BODY_SHARE = 0.93, 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +102,7 @@ def static_mask(
     a, b = a - cv2.blur(a, size), b - cv2.blur(b, size)
     energy = [cv2.blur(x * x, size) for x in (a, b)]
     likeness = cv2.blur(a * b, size) / np.sqrt(energy[0] * energy[1] + 1e-3)
-    same = ((likeness > 0.85) & usable & (np.minimum(*energy) > 25.0)).astype(np.uint8)
+    same = ((likeness > _SAME) & usable & (np.minimum(*energy) > 25.0)).astype(np.uint8)
     # Edges of the scene may fall on one another by chance; a body is larger.
     _, labels, stats, _ = cv2.connectedComponentsWithStats(same)
     large = stats[:, cv2.CC_STAT_AREA] > _BODY_SHARE * same.size

@@ -6,18 +6,18 @@ direction.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 
 from panorama_stitch.overlap.strips import Strips, seam_rays
 
-_SPACING_RAD = np.radians(2.5)
-"""Between patches, which are twice as wide and high."""
+_AREA_RAD2 = np.radians(2.5) ** 2
+"""Unit in which areas are counted."""
 _LEAST_SEEN = 0.7
 _LEAST_PEAK = 0.5
-_NOISE_FACTOR = 3.0
+_NOISE_FACTOR = 0.8
 _GRAIN_PX = 4.0
 """Pixels that vary together."""
 _FLOOR_PX = 0.12
@@ -37,13 +37,13 @@ class Votes:
     deviation
         (n, 2) rad, standard deviations along and across.
     weight
-        (n,) area, in patches' spacings.
+        (n,) area, in squares of 2.5 degrees.
     peak
         (n,) correlation.
     textured
-        Area, in spacings, that shows anything at all, whether it voted or not.
+        Area that shows anything at all, whether it voted or not.
     area
-        Area, in spacings, of the whole overlap.
+        Area of the whole overlap.
     """
 
     right: np.ndarray
@@ -57,7 +57,13 @@ class Votes:
     area: float
 
 
-def cast_votes(strips: Strips, along_rad, across_rad: float) -> Votes:
+_COLUMNS = ('right', 'left', 'along', 'across', 'deviation', 'weight', 'peak')
+"""What there is one of for each vote."""
+
+
+def cast_votes(
+    strips: Strips, along_rad, across_rad: float, spacing_rad: float = np.radians(2.5)
+) -> Votes:
     """Correlate every patch of the right strip with the left one.
 
     Parameters
@@ -68,11 +74,13 @@ def cast_votes(strips: Strips, along_rad, across_rad: float) -> Votes:
         Smallest and largest displacement of the left view's patch along the rows.
     across_rad
         Largest one up and down.
+    spacing_rad
+        Between patches, which are twice as wide and high.
     """
     density = strips.density
     low, high = int(np.floor(along_rad[0] * density)), int(np.ceil(along_rad[1] * density))
     rise = int(np.ceil(across_rad * density))
-    block = max(3, round(_SPACING_RAD * density))
+    block = max(3, round(spacing_rad * density))
     rows, columns = (side // block for side in strips.right.image.shape)
     right, right_valid, noise = _detail(strips.right, block)
     left, left_valid, _ = _detail(strips.left, block)
@@ -108,7 +116,18 @@ def cast_votes(strips: Strips, along_rad, across_rad: float) -> Votes:
             np.divide(both, scale, out=volume[j, i], where=left_seen[corner] > _LEAST_SEEN)
     centers = [block * np.arange(1, count) - 0.5 for count in (rows, columns)]
     v, u = strips.v_rad[0] + centers[0] / density, strips.u_rad[0] + centers[1] / density
-    return _peaks(volume, chosen, seen, u, v, (low - 1, -rise - 1), block, density)
+    votes = _peaks(volume, chosen, seen, u, v, (low - 1, -rise - 1), block, density)
+    return _scaled(votes, (block / density) ** 2 / _AREA_RAD2)
+
+
+def _scaled(votes, area) -> Votes:
+    """Give every patch this area."""
+    return replace(
+        votes,
+        weight=votes.weight * area,
+        textured=votes.textured * area,
+        area=votes.area * area,
+    )
 
 
 def _none() -> Votes:
@@ -118,12 +137,18 @@ def _none() -> Votes:
 
 def pooled(votes: Sequence[Votes]) -> Votes:
     """Put votes of several frames, in one seam frame, together."""
-    fields = ('right', 'left', 'along', 'across', 'deviation', 'weight', 'peak')
-    joined = {name: np.concatenate([getattr(one, name) for one in votes]) for name in fields}
+    joined = {name: np.concatenate([getattr(one, name) for one in votes]) for name in _COLUMNS}
     return Votes(
         **joined,
         **{name: sum(getattr(one, name) for one in votes) for name in ('textured', 'area')},
     )
+
+
+def thinned(votes: Votes, most: int) -> Votes:
+    """Keep every so-many-th vote, `most` at most, each with the weight of those that it is for."""
+    stride = -(-max(len(votes.peak), 1) // most)
+    kept = {name: getattr(votes, name)[::stride] for name in _COLUMNS}
+    return replace(votes, **{**kept, 'weight': kept['weight'] * stride})
 
 
 def _detail(strip, block):
