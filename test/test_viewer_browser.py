@@ -18,6 +18,7 @@ from selenium.webdriver import ActionChains, Keys
 
 from fisheye_bridge.projection import surface_of
 from fisheye_geometry.surface import Surface
+from fisheye_geometry.surface_kind import KINDS
 from fisheye_testing.rig import camera_parameters, wait_for
 from panorama_viewer.projection import described
 from panorama_viewer.server import ViewerServer
@@ -193,6 +194,33 @@ def patch(page, name, color):
 
     page.until(look, f'{color} in {name}')
     return found
+
+
+def test_every_kind_of_surface_is_tried_here():
+    assert [surface.kind for surface in SURFACES] == list(KINDS)
+
+
+@pytest.mark.parametrize('surface', SURFACES, ids=lambda surface: surface.kind)
+def test_the_page_knows_every_kind_of_surface_as_python_does(browser, serve, surface):
+    server = serve(surface, painted(surface, 0, 0))
+    Page(browser, server.url)
+    pixels = np.array([[x, y] for x in (3.0, 500.0, 900.0) for y in (40.0, 300.0, 450.0)])
+    rays, back, is_bearing = browser.execute_async_script(
+        """
+        const [message, pixels, done] = arguments;
+        import('/geometry.js').then(({ Projection }) => {
+          const projection = new Projection(message);
+          const rays = pixels.map(([x, y]) => projection.ray(x, y));
+          const { columnsAreBearings } = projection.kind;
+          done([rays, rays.map((ray) => projection.pixel(ray)), columnsAreBearings]);
+        });
+        """,
+        described(surface),
+        pixels.tolist(),
+    )
+    assert np.array(rays) == pytest.approx(surface.unproject(pixels)[0], abs=1e-9)
+    assert np.array(back) == pytest.approx(pixels, abs=1e-6)
+    assert is_bearing == surface.yaw_is_column_shift
 
 
 @pytest.mark.parametrize('surface', SURFACES, ids=lambda surface: surface.kind)

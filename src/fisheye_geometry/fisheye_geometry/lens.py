@@ -11,9 +11,17 @@ from fisheye_geometry.fisheye_lens import FisheyeLens
 from fisheye_geometry.lens_model import MAX_PICTURE_SIDE_PX, Lens
 from fisheye_geometry.pinhole_lens import PinholeLens
 
-__all__ = ['MAX_PICTURE_SIDE_PX', 'AnnularLens', 'FisheyeLens', 'Lens', 'PinholeLens', 'make_lens']
+__all__ = [
+    'MAX_PICTURE_SIDE_PX',
+    'MODELS',
+    'AnnularLens',
+    'FisheyeLens',
+    'Lens',
+    'PinholeLens',
+    'make_lens',
+]
 
-_MODELS: dict[str, type[Lens]] = {
+MODELS: dict[str, type[Lens]] = {
     'equidistant': FisheyeLens,
     'fisheye': FisheyeLens,
     'plumb_bob': PinholeLens,
@@ -49,11 +57,11 @@ def make_lens(
     CalibrationError
         For an unknown model and for numbers that describe no lens.
     """
-    if model not in _MODELS:
+    if model not in MODELS:
         raise CalibrationError(
-            f'distortion model {model!r:.60} is not known; expected one of {", ".join(_MODELS)}'
+            f'distortion model {model!r:.60} is not known; expected one of {", ".join(MODELS)}'
         )
-    lens = _MODELS[model]
+    lens = MODELS[model]
     most = max(lens.coefficient_counts)
     if not any(distortion[most:]):
         distortion = distortion[:most]

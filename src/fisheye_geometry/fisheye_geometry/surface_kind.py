@@ -33,6 +33,11 @@ class SurfaceKind(ABC):
     widest_rad: float
     fov_limit_rad: float = inf
 
+    def __init_subclass__(cls) -> None:
+        needed = ('yaw_is_column_shift', 'steepest_rad', 'widest_rad')
+        if missing := [name for name in needed if not hasattr(cls, name)]:
+            raise TypeError(f'{cls.__name__} lacks {", ".join(missing)}')
+
     @abstractmethod
     def rays(self, a: np.ndarray, b: np.ndarray) -> Rays:
         """Return the rays (x, y, z), of any length, at columns and rows."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fisheye_core.errors import CalibrationError
-from fisheye_geometry.lens import make_lens
+from fisheye_geometry.lens import MODELS, make_lens
 
 EXACT_PX = 1e-6
 """Rounding of float64 through a polynomial and its inverse stays far below it."""
@@ -48,12 +48,37 @@ TILTED = make_lens(
     [*PRISM.distortion, 0.06, -0.04],
 )
 PLAIN = make_lens('plumb_bob', 640, 480, [400, 0, 320, 0, 400, 240, 0, 0, 1], [])
+ANNULAR = make_lens(
+    'annular', 640, 480, [230, 0, 319.5, 0, 230, 239.5, 0, 0, 1], [0.3, -0.4, 0.6, 1.0]
+)
+EXAMPLES = {
+    'equidistant': FISHEYE,
+    'fisheye': FOLDING,
+    'plumb_bob': PINHOLE,
+    'rational_polynomial': TILTED,
+    'annular': ANNULAR,
+}
 
 
 def pixels_around(lens):
     x = np.linspace(-0.5, lens.width - 0.5, 161)
     y = np.linspace(-0.5, lens.height - 0.5, 121)
     return np.stack(np.meshgrid(x, y), axis=-1)
+
+
+@pytest.mark.parametrize('model', MODELS)
+def test_each_model_is_rebuilt_from_the_numbers_that_ros_gets(model):
+    lens = EXAMPLES[model]
+    assert type(lens) is MODELS[model]
+    again = make_lens(lens.ros_model, lens.width, lens.height, lens.matrix, lens.distortion)
+    assert again == lens
+    assert len(lens.distortion) in lens.coefficient_counts
+    assert 0 < lens.max_angle_rad <= np.pi
+    rays, seen = lens.unproject(pixels_around(lens))
+    back, still_seen = lens.project(rays)
+    assert seen.any()
+    assert still_seen[seen].all()
+    assert np.abs(back - pixels_around(lens))[seen].max() < EXACT_PX
 
 
 @pytest.mark.parametrize('lens', [FISHEYE, FOLDING, PINHOLE, RATIONAL, PRISM, TILTED, PLAIN])

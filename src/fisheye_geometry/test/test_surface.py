@@ -6,6 +6,7 @@ import pytest
 from fisheye_core.errors import GeometryError
 from fisheye_geometry.lens import make_lens
 from fisheye_geometry.surface import SURFACES, Surface, surface_for
+from fisheye_geometry.surface_kind import KINDS, SurfaceKind
 
 LENS = make_lens(
     'equidistant',
@@ -25,17 +26,63 @@ def test_a_pixel_comes_back_from_its_ray(kind):
     assert np.abs(pixels - np.stack([x, y], -1)).max() < 1e-9
 
 
-@pytest.mark.parametrize('kind', ['cylindrical', 'equirectangular'])
-def test_a_turn_of_the_camera_is_a_shift_of_columns(kind):
-    surface = Surface(kind, 900, 400, 200.0, 450.0, 190.0)
-    turn = 0.7
-    rays = surface.rays(np.arange(100.0, 600.0), 120.0)
-    turned = rays @ np.array(
-        [[np.cos(turn), 0, -np.sin(turn)], [0, 1, 0], [np.sin(turn), 0, np.cos(turn)]]
-    )
-    shift = surface.project(turned)[0] - surface.project(rays)[0]
-    assert shift == pytest.approx(np.broadcast_to([turn * 200, 0], shift.shape), abs=1e-9)
-    assert surface.yaw_is_column_shift
+def check_kind(how: SurfaceKind):
+    """Demand of a kind of surface what the rest of the code takes for granted."""
+    a, b = np.meshgrid(np.linspace(-0.9, 0.9, 7), np.linspace(-0.8, 0.8, 5))
+    x, y, z = how.rays(a, b)
+    assert np.array(how.point(3 * x, 3 * y, 3 * z)) == pytest.approx(np.array([a, b]), abs=1e-9)
+    ahead = np.array(how.rays(np.zeros(1), np.zeros(1))).ravel()
+    assert ahead / np.linalg.norm(ahead) == pytest.approx([0, 0, 1])
+    for angle in (0.0, 0.3, 0.9):
+        side = np.array([np.sin(angle)]), np.zeros(1), np.array([np.cos(angle)])
+        assert how.point(*side) == pytest.approx((how.column(angle), 0), abs=1e-9)
+        down = np.zeros(1), np.array([np.sin(angle)]), np.array([np.cos(angle)])
+        assert how.point(*down) == pytest.approx((0, how.row(angle)), abs=1e-9)
+    turn = 0.4
+    turned = how.point(x * np.cos(turn) + z * np.sin(turn), y, z * np.cos(turn) - x * np.sin(turn))
+    is_shift = np.allclose(np.array(turned), np.array([a + turn, b]), atol=1e-9)
+    assert is_shift == how.yaw_is_column_shift
+    assert 0 < how.steepest_rad <= np.pi / 2
+    assert 0 < how.widest_rad <= np.pi
+    assert how.fov_limit_rad > 2 * how.steepest_rad
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_each_kind_of_surface_is_what_it_says(kind):
+    check_kind(KINDS[kind])
+
+
+class Stereographic(SurfaceKind):
+    """A plane seen from the point opposite, with what its author took over from the cylinder."""
+
+    yaw_is_column_shift = True
+    steepest_rad = widest_rad = np.pi / 2
+
+    def rays(self, a, b):
+        return 4 * a, 4 * b, 4 - a * a - b * b
+
+    def point(self, x, y, z):
+        length = np.sqrt(x * x + y * y + z * z)
+        return 2 * x / (length + z), 2 * y / (length + z)
+
+    def column(self, angle_rad):
+        return 2 * np.tan(angle_rad / 2)
+
+    row = column
+
+
+def test_a_new_kind_that_says_of_itself_what_is_not_true_fails():
+    with pytest.raises(AssertionError):
+        check_kind(Stereographic())
+    Stereographic.yaw_is_column_shift = False
+    check_kind(Stereographic())
+
+
+def test_a_kind_without_its_properties_is_refused_where_it_is_written():
+    with pytest.raises(
+        TypeError, match='Half lacks yaw_is_column_shift, steepest_rad, widest_rad'
+    ):
+        type('Half', (SurfaceKind,), {})
 
 
 def test_a_ray_behind_a_plane_is_not_seen():

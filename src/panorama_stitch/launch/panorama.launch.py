@@ -19,6 +19,7 @@ from launch_ros.actions import Node, SetParameter
 
 from fisheye_core.errors import FileAccessError, FileContentError
 from fisheye_core.yaml_file import read_mapping
+from fisheye_geometry.surface_kind import KINDS
 from launch import LaunchDescription, logging
 
 CONFIG = Path(get_package_share_directory('panorama_stitch')) / 'config'
@@ -217,7 +218,7 @@ def measured_yaw_deg(path):
     try:
         saved = read_mapping(path)
         (left, right), (overlap,) = saved['cameras'], saved['overlaps']
-        is_angle = overlap['found'] and left['surface'] != 'rectilinear'
+        is_angle = overlap['found'] and KINDS[left['surface']].yaw_is_column_shift
         apart_px = overlap['offset_x_px'] + right['center_x_px'] - left['center_x_px']
         yaw_deg = degrees(apart_px / left['focal_px'])
     except (FileAccessError, FileContentError) as error:

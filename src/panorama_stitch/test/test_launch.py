@@ -9,6 +9,8 @@ import pytest
 import yaml
 from ament_index_python.packages import PackageNotFoundError
 
+from fisheye_geometry.surface_kind import KINDS
+
 FILE = Path(__file__).parents[1] / 'launch' / 'panorama.launch.py'
 CAPTURES = {'left/capture', 'right/capture'}
 REST = {'left/undistort', 'right/undistort', 'stitch'}
@@ -30,7 +32,7 @@ def loaded():
     return module
 
 
-class Rig:
+class LaunchFile:
     """The launch file with stubs in the place of launch."""
 
     def __init__(self, monkeypatch):
@@ -72,7 +74,7 @@ class Rig:
 @pytest.fixture
 def rig(monkeypatch):
     monkeypatch.setattr(sys, 'argv', ['ros2', 'launch', 'panorama_stitch', FILE.name])
-    return Rig(monkeypatch)
+    return LaunchFile(monkeypatch)
 
 
 @pytest.fixture
@@ -188,6 +190,16 @@ def test_transforms_of_a_given_and_of_a_measured_angle(rig, overlap_file):
     for name in transforms:
         assert measured[name].arguments == given[name].arguments
     assert given['left_transform'].arguments[-3] == '-0.479425539'
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_an_offset_is_an_angle_where_the_kind_of_surface_says_so(rig, overlap_file, kind):
+    overlap_file.write_text(overlap_file.read_text().replace('cylindrical', kind))
+    if KINDS[kind].yaw_is_column_shift:
+        assert 'left_transform' in rig.start(transforms='true', overlap_file=str(overlap_file))[0]
+    else:
+        with pytest.raises(RuntimeError, match='holds no angle between the cameras'):
+            rig.start(transforms='true', overlap_file=str(overlap_file))
 
 
 def test_transforms_wait_for_a_file_that_is_not_there_yet(rig, tmp_path):

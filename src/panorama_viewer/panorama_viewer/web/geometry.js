@@ -1,8 +1,31 @@
 // Where a pixel of the panorama looks, and the virtual camera that looks into it.
 // Rays are [x right, y down, z ahead]; angles are radians, bearings positive to the right.
 
-/** Surfaces by number, as the shader knows them. */
-export const SURFACES = ['cylindrical', 'equirectangular', 'rectilinear'];
+/**
+ * How each kind of surface maps rays, in focal lengths from its centre: ray (a, b) => [x, y, z],
+ * point [x, y, z] => [a, b] or null, the latter once more as GLSL for the shader, and whether
+ * its columns are bearings, so that it can lead all around.
+ */
+export const SURFACES = {
+  cylindrical: {
+    columnsAreBearings: true,
+    ray: (a, b) => [Math.sin(a), b, Math.cos(a)],
+    point: ([x, y, z]) => [Math.atan2(x, z), y / Math.hypot(x, z)],
+    shader: 'vec2(atan(ray.x, ray.z), ray.y / length(ray.xz))',
+  },
+  equirectangular: {
+    columnsAreBearings: true,
+    ray: (a, b) => [Math.cos(b) * Math.sin(a), Math.sin(b), Math.cos(b) * Math.cos(a)],
+    point: ([x, y, z]) => [Math.atan2(x, z), Math.atan2(y, Math.hypot(x, z))],
+    shader: 'vec2(atan(ray.x, ray.z), atan(ray.y, length(ray.xz)))',
+  },
+  rectilinear: {
+    columnsAreBearings: false,
+    ray: (a, b) => [a, b, 1],
+    point: ([x, y, z]) => (z > 0 ? [x / z, y / z] : null),
+    shader: 'ray.z > 0.0 ? ray.xy / ray.z : vec2(1e9)',
+  },
+};
 
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 
@@ -10,27 +33,22 @@ const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 export class Projection {
   constructor(message) {
     Object.assign(this, message);
-    if (!SURFACES.includes(this.surface)) {
+    if (!Object.hasOwn(SURFACES, this.surface)) {
       throw new Error(`this page cannot show a ${this.surface} panorama; `
-        + `expected ${SURFACES.join(', ')}`);
+        + `expected ${Object.keys(SURFACES).join(', ')}`);
     }
+    this.kind = SURFACES[this.surface];
   }
 
   /** Ray of a pixel; integers are pixel centres. */
   ray(x, y) {
-    const a = (x - this.center_x_px) / this.focal_px;
-    const b = (y - this.center_y_px) / this.focal_px;
-    if (this.surface === 'cylindrical') return [Math.sin(a), b, Math.cos(a)];
-    if (this.surface === 'rectilinear') return [a, b, 1];
-    return [Math.cos(b) * Math.sin(a), Math.sin(b), Math.cos(b) * Math.cos(a)];
+    return this.kind.ray((x - this.center_x_px) / this.focal_px,
+      (y - this.center_y_px) / this.focal_px);
   }
 
   /** Pixel [x, y] of a ray; null where the surface cannot show it. */
-  pixel([x, y, z]) {
-    const side = Math.hypot(x, z);
-    let point = [Math.atan2(x, z), Math.atan2(y, side)];
-    if (this.surface === 'cylindrical') point[1] = y / side;
-    if (this.surface === 'rectilinear') point = z > 0 ? [x / z, y / z] : null;
+  pixel(ray) {
+    const point = this.kind.point(ray);
     return point && [
       this.center_x_px + this.focal_px * point[0],
       this.center_y_px + this.focal_px * point[1],
@@ -49,7 +67,7 @@ export class Projection {
     const [, top] = this.angles(this.center_x_px, -0.5);
     const [, bottom] = this.angles(this.center_x_px, this.height - 0.5);
     const beyond = (edge_px) => Math.abs(edge_px - this.center_x_px) >= Math.PI * this.focal_px;
-    const round = this.surface !== 'rectilinear' && beyond(-0.5) && beyond(this.width - 0.5);
+    const round = this.kind.columnsAreBearings && beyond(-0.5) && beyond(this.width - 0.5);
     return { left: round ? -Infinity : left, right: round ? Infinity : right, top, bottom };
   }
 }

@@ -11,6 +11,10 @@ const VERTEX = `
     gl_Position = vec4(corner.x, -corner.y, 0.0, 1.0);
   }`;
 
+const CASES = Object.values(SURFACES).map(
+  ({ shader }, kind) => `if (kind == ${kind}) return ${shader};`,
+);
+
 const FRAGMENT = `
   precision highp float;
   varying vec2 point;
@@ -19,14 +23,13 @@ const FRAGMENT = `
   uniform int kind;
   uniform vec2 center, size;
   uniform float focal;
+  vec2 place(vec3 ray) {
+    ${CASES.join('\n    ')}
+    return vec2(1e9);
+  }
   void main() {
-    vec3 ray = turn * vec3(point, 1.0);
-    float side = length(ray.xz);
-    vec2 place = vec2(atan(ray.x, ray.z), kind == 0 ? ray.y / side : atan(ray.y, side));
-    if (kind == 2) place = ray.xy / ray.z;
-    vec2 where = (center + focal * place + 0.5) / size;
+    vec2 where = (center + focal * place(turn * vec3(point, 1.0)) + 0.5) / size;
     bool inside = all(greaterThanEqual(where, vec2(0.0))) && all(lessThanEqual(where, vec2(1.0)));
-    if (kind == 2 && ray.z <= 0.0) inside = false;
     gl_FragColor = inside ? texture2D(panorama, where) : vec4(0.063, 0.082, 0.106, 1.0);
   }`;
 
@@ -81,7 +84,7 @@ export class Look {
     gl.uniformMatrix3fv(this.at('turn'), false, [
       ...ray.map((i) => right[i] - ahead[i]), ...ray.map((i) => down[i] - ahead[i]), ...ahead,
     ]);
-    gl.uniform1i(this.at('kind'), SURFACES.indexOf(projection.surface));
+    gl.uniform1i(this.at('kind'), Object.keys(SURFACES).indexOf(projection.surface));
     gl.uniform2f(this.at('center'), projection.center_x_px, projection.center_y_px);
     gl.uniform2f(this.at('size'), projection.width, projection.height);
     gl.uniform1f(this.at('focal'), projection.focal_px);
