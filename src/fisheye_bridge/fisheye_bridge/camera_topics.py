@@ -42,6 +42,7 @@ class CameraSubscription:
         check: Callable[[Lens], object],
         namespace: str = '',
         transport: str = 'raw',
+        cut: Callable[[np.ndarray], np.ndarray] | None = None,
     ):
         """Subscribe.
 
@@ -61,8 +62,11 @@ class CameraSubscription:
             Of the topics, below that of the node.
         transport
             'raw' or 'compressed', of the pictures.
+        cut
+            Takes the camera's part out of each picture; a `FisheyeError` that it raises drops the
+            picture. None: it is all of it.
         """
-        self._node = node
+        self._node, self._cut = node, cut
         self._on_picture, self._on_lens, self._check = on_picture, on_lens, check
         self._prefix = f'{namespace}/' if namespace else ''
         self._seen: CircledLens | None = None
@@ -157,6 +161,8 @@ class CameraSubscription:
         self._seen = CircledLens(lens)
 
     def _take_picture(self, image: np.ndarray, encoding: str, header: Header) -> None:
+        if self._cut:
+            image = self._cut(image)
         self._picture_size = image.shape[1::-1]
         seen = self._seen
         if seen and seen.look(image):

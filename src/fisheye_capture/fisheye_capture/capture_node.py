@@ -15,6 +15,7 @@ from fisheye_bridge.topics import ImagePublisher
 from fisheye_capture.calibration_url import calibration_path
 from fisheye_capture.capture_settings import CaptureSettings
 from fisheye_capture.grabber import Grabber
+from fisheye_capture.region import region_named
 from fisheye_capture.source import Frame, JpegFrame, shown_source
 from fisheye_core.errors import CalibrationError, FisheyeError, SettingError
 from fisheye_core.latest_only import LatestOnlyWorker
@@ -35,6 +36,7 @@ class CaptureNode(Node):
         self._calibration_path = calibration_path(
             self._settings.camera_info_url, self._settings.camera_name
         )
+        self._region = region_named(self._settings.region)
         self._image = ImagePublisher(self, 'image_raw')
         self._camera_info = self.create_publisher(CameraInfo, 'camera_info', IMAGE)
         self._info, self._described, self._fault = CameraInfo(), None, ''
@@ -59,7 +61,8 @@ class CaptureNode(Node):
         """Give the camera of the calibration file, else what the source knows of itself."""
         path = self._calibration_path
         if path is None:
-            return self._grabber.camera
+            camera = self._grabber.camera
+            return self._region.camera(camera) if camera and self._region else camera
         if is_missing(path):
             self.get_logger().warning(f'{path} is not there yet; set_camera_info writes it')
             return None
@@ -68,9 +71,11 @@ class CaptureNode(Node):
     def _publish(self, frame: Frame | JpegFrame) -> None:
         settings = self._declared.settings
         header = Header(stamp=stamp_of(frame.stamp_ns), frame_id=self._settings.frame_id)
-        if self._described != (self._camera, *frame.size):
-            self._describe(self._camera, *frame.size)
         try:
+            if self._region:
+                frame = self._region.frame(frame)
+            if self._described != (self._camera, *frame.size):
+                self._describe(self._camera, *frame.size)
             self._image.publish_picture(frame, settings.encoding, header, settings.jpeg_quality)
         except FisheyeError as error:
             self._broken.add(error)

@@ -90,6 +90,11 @@ class CameraSettings:
         minimum=0.0,
         maximum=10000.0,
     )
+    region: str = setting(
+        '',
+        "Part of the source's frames that this camera is: left, right, top or bottom half, or "
+        'x,y,w,h in px; empty: the whole frame. Its calibration is of the region.',
+    )
     camera_info_url: str = setting(
         '',
         'Calibration file: a path, file:// or package://; ${ROS_HOME} and ${NAME} (of the camera) '

@@ -184,6 +184,27 @@ def test_the_jpeg_of_a_device_is_decoded_for_those_who_want_pixels(ros, jpeg_dev
     assert (encoding, image.shape, image[0, 0, 0]) == ('bgr8', (24, 32, 3), 90)
 
 
+def test_a_region_of_a_device_is_coded_anew(ros, jpeg_device):
+    topic = '/left/image_raw/compressed'
+    ros.ear.listen(CompressedImage, topic)
+    ros.start(source=jpeg_device, region='8,4,16,12')
+    image, _ = from_jpeg(ros.hear(topic))
+    assert image.shape == (12, 16, 3)
+    assert image.mean() == pytest.approx(90, abs=3)
+    assert to_array(ros.hear('/left/image_raw'))[0].shape == (12, 16, 3)
+    info = ros.hear('/left/camera_info')
+    assert (info.width, info.height) == (16, 12)
+
+
+def test_a_region_outside_the_picture_is_told(ros, jpeg_device):
+    ros.start(source=jpeg_device, region='8,4,160,12')
+    said = "region '8,4,160,12' reaches outside the frame of 32x24 px; expected x + w up to 32"
+    ros.spin_until(
+        lambda: said in ros.hear('/diagnostics').status[0].message, 'the sentence about it'
+    )
+    assert '/left/image_raw' not in ros.ear.heard
+
+
 def test_a_device_held_on_its_side_gives_pictures_as_its_sensor_does(
     ros, jpeg_device, monkeypatch
 ):

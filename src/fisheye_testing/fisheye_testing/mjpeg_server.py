@@ -21,10 +21,12 @@ class MjpegServer:
         The bytes to send; changing them shows at once.
     stalled
         Set: connections stay open and nothing is sent.
+    connections
+        How many were opened so far.
     """
 
     def __init__(self, picture: bytes, *, rate_hz: float = 50.0, port: int = 0):
-        self.picture = picture
+        self.picture, self.connections = picture, 0
         self.stalled = Event()
         self._stopping = Event()
         self._period_s = 1 / rate_hz
@@ -55,6 +57,7 @@ class MjpegServer:
         self._thread.join()
 
     def _serve(self, request):
+        self.connections += 1
         request.send_response(200)
         request.send_header('Content-Type', 'multipart/x-mixed-replace; boundary=frame')
         request.end_headers()

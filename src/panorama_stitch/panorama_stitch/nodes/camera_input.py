@@ -2,6 +2,7 @@
 
 from dataclasses import fields
 
+import numpy as np
 from std_msgs.msg import Header
 
 from fisheye_bridge.camera_topics import CameraSubscription
@@ -11,12 +12,14 @@ from fisheye_bridge.stamps import ns_of, stamp_of
 from fisheye_bridge.topics import ImagePublisher
 from fisheye_capture.calibration_url import calibration_of
 from fisheye_capture.capture_settings import CameraSettings, CaptureSettings, FrameSettings
-from fisheye_capture.grabber import Grabber
+from fisheye_capture.region import AnyFrame, region_named
 from fisheye_capture.source import shown_source
 from fisheye_core.errors import CameraFileError, FisheyeError
+from fisheye_geometry.camera import Camera
 from fisheye_geometry.image_circle import CircledLens
 from fisheye_geometry.lens import Lens
 from panorama_stitch.nodes.base_node import PanoramaBase
+from panorama_stitch.nodes.frame_reader import Reader, reader_for
 from panorama_stitch.pipeline.panorama_settings import PanoramaSettings
 
 TOPIC = 'topic'
@@ -24,7 +27,7 @@ TOPIC = 'topic'
 
 
 class CameraInput:
-    """One camera of the panorama node: where its frames come from, and what they show."""
+    """One camera of the panorama node: what its frames show, and where they go."""
 
     lens: Lens | None
 
@@ -42,105 +45,78 @@ class CameraInput:
             surface = settings.surface_of(self.lens)
             self._node.pipeline.place(self._name, self.lens, surface, settings.interpolation)
 
-    def start(self) -> None:
-        """Begin to read."""
-
-    def stop(self) -> None:
-        """Release the camera."""
-
 
 class LocalCamera(CameraInput):
-    """A camera that the node reads itself."""
+    """A camera whose calibration the node reads itself: all of a reader's frames, or a region."""
 
-    def __init__(self, node: PanoramaBase, name: str, own: CameraSettings):
+    def __init__(self, node: PanoramaBase, name: str, own: CaptureSettings, reader: Reader):
         super().__init__(node, name)
-        shared = {
-            entry.name: getattr(node.settings, entry.name) for entry in fields(FrameSettings)
-        }
-        named = {
-            entry.name: getattr(own.named(name), entry.name) for entry in fields(CameraSettings)
-        }
-        self._settings = CaptureSettings(**named, **shared)
-        self._raw = ImagePublisher(node, f'{name}/image_raw')
-        self._grabber = Grabber(self._settings, self._take, on_change=self._tell)
-        url, called = self._settings.camera_info_url, self._settings.camera_name
-        camera = calibration_of(url, called) or self._grabber.camera
-        if camera is None:
-            shown = shown_source(own.source)
-            raise CameraFileError(
-                f'{name}.camera_info_url is empty; expected the calibration file of {shown} '
-                '(calibrate_lens makes one)'
-            )
+        self._settings = own
+        self._region = region_named(own.region, f'{name}.region')
+        is_topic = own.source == TOPIC
+        self._raw = None if is_topic else ImagePublisher(node, f'{name}/image_raw')
+        camera = self._calibration(reader)
         self._camera, self._seen, self._fault = camera, CircledLens(camera.lens), ''
         self._broken = DropCounter(node, f'a picture of {name}', f'{name} broken')
         self.place(node.settings)
-        if self._grabber.attempts:
-            self._tell(self._grabber.reason)
+        reader.add(name, self._take)
 
     @property
     def lens(self) -> Lens:
         """What the camera sees, within the circle that the lens lights."""
         return self._seen.lens
 
-    def start(self) -> None:
-        """Begin to read."""
-        self._grabber.start()
-
-    def stop(self) -> None:
-        """Release the camera."""
-        self._grabber.stop()
-
     def report(self, report: Report) -> None:
         """Report what is wrong with the camera, and its numbers."""
-        grabber = self._grabber
-        report.values[f'{self._name} skipped'] = grabber.skipped
-        report.values[f'{self._name} damaged'] = grabber.damaged
-        for level, sentence in (
-            (ERROR, grabber.complaint),
-            (WARN, grabber.note),
-            (WARN, grabber.damage()),
-            (ERROR, self._fault),
-            (WARN, self._seen.note),
-        ):
+        for level, sentence in ((ERROR, self._fault), (WARN, self._seen.note)):
             if sentence:
                 report.add(level, f'{self._name}: {sentence}')
         self._broken.tell(report)
 
-    def _take(self, frame) -> None:
-        fault, self._fault = self._fault, self._camera.size_mismatch(*frame.size)
-        if self._fault:
-            if not fault:
-                self._node.warn(f'{self._name}: {self._fault}')
-            return
+    def _calibration(self, reader: Reader) -> Camera:
+        own = self._settings
+        if camera := calibration_of(own.camera_info_url, own.camera_name):
+            return camera
+        if reader.camera is None:
+            raise CameraFileError(
+                f'{self._name}.camera_info_url is empty; expected the calibration file of '
+                f'{shown_source(own.source)} (calibrate_lens makes one)'
+            )
+        return self._region.camera(reader.camera) if self._region else reader.camera
+
+    def _take(self, frame: AnyFrame, encoding: str) -> None:
+        before = self._fault
         try:
-            image, encoding = frame.image, self._settings.encoding
+            self._fault = self._region.fault(*frame.size) if self._region else ''
+            if self._region and not self._fault:
+                frame = self._region.frame(frame)
+            self._fault = self._fault or self._camera.size_mismatch(*frame.size)
+            if not self._fault:
+                self._show(frame, frame.image, encoding)
+            elif not before:
+                self._node.warn(f'{self._name}: {self._fault}')
         except FisheyeError as error:
             self._broken.add(error)
-            return
+
+    def _show(self, frame: AnyFrame, image: np.ndarray, encoding: str) -> None:
         noted = self._seen.note
         if self._seen.look(image):
             self.place(self._node.settings)
         if self._seen.note and not noted:
             self._node.warn(f'{self._name}: {self._seen.note}')
         self._node.pipeline.take(self._name, frame.stamp_ns, image, encoding)
-        if self._raw.wanted:
+        if self._raw and self._raw.wanted:
             header = Header(stamp=stamp_of(frame.stamp_ns), frame_id=self._settings.frame_id)
             quality = self._node.settings.jpeg_quality
             self._raw.publish_picture(frame, encoding, header, quality)
 
-    def _tell(self, reason: str) -> None:
-        news = f'{self._name}: {self._grabber.news(reason)}'
-        if reason:
-            self._node.warn(news)
-        else:
-            self._node.get_logger().info(news)
-
 
 class RemoteCamera(CameraInput):
-    """A camera that another node reads."""
+    """A camera that another node reads, and describes with camera_info."""
 
-    def __init__(self, node: PanoramaBase, name: str):
+    def __init__(self, node: PanoramaBase, name: str, region: str):
         super().__init__(node, name)
+        self._region = region_named(region, f'{name}.region')
         self._camera = CameraSubscription(
             node,
             on_picture=self._take,
@@ -148,6 +124,7 @@ class RemoteCamera(CameraInput):
             check=lambda lens: node.settings.surface_of(lens),
             namespace=name,
             transport=node.settings.transport,
+            cut=self._region.cut if self._region else None,
         )
 
     @property
@@ -163,7 +140,30 @@ class RemoteCamera(CameraInput):
         self._node.pipeline.take(self._name, ns_of(header.stamp), image, encoding)
 
 
-def camera_input(node: PanoramaBase, name: str) -> LocalCamera | RemoteCamera:
-    """Return the input of a camera, as its parameters say."""
-    own = Parameters(node, CameraSettings, prefix=f'{name}.').settings
-    return RemoteCamera(node, name) if own.source == TOPIC else LocalCamera(node, name, own)
+def camera_inputs(node: PanoramaBase) -> tuple[list[CameraInput], list[Reader]]:
+    """Return the inputs of a node's cameras, as their parameters say, and what reads for them.
+
+    Raises
+    ------
+    FisheyeError
+        If a source or a calibration can never work.
+    """
+    inputs: list[CameraInput] = []
+    readers: dict[str, Reader] = {}
+    for name in node.settings.cameras:
+        own = _capture_settings(node, name)
+        if own.source == TOPIC and not (own.region and own.camera_info_url):
+            inputs.append(RemoteCamera(node, name, own.region))
+            continue
+        reader = reader_for(readers, node, name, own)
+        inputs.append(LocalCamera(node, name, own, reader))
+    return inputs, list(readers.values())
+
+
+def _capture_settings(node: PanoramaBase, name: str) -> CaptureSettings:
+    """Return the settings of a camera and those that all have in common."""
+    own = Parameters(node, CameraSettings, prefix=f'{name}.').settings.named(name)
+    return CaptureSettings(
+        **{entry.name: getattr(own, entry.name) for entry in fields(CameraSettings)},
+        **{entry.name: getattr(node.settings, entry.name) for entry in fields(FrameSettings)},
+    )

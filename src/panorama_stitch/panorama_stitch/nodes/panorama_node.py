@@ -4,7 +4,7 @@ from fisheye_bridge.diagnostics import Report
 from fisheye_bridge.running import run
 from fisheye_capture.capture_settings import CameraSettings
 from panorama_stitch.nodes.base_node import PanoramaBase
-from panorama_stitch.nodes.camera_input import camera_input
+from panorama_stitch.nodes.camera_input import camera_inputs
 from panorama_stitch.pipeline.panorama_settings import PanoramaSettings
 
 
@@ -14,16 +14,16 @@ class PanoramaNode(PanoramaBase):
     SETTINGS = (('', PanoramaSettings), ('CAMERA.', CameraSettings))
 
     def __init__(self, **kwargs):
-        self._inputs = []
+        self._inputs, self._readers = [], []
         super().__init__('panorama', PanoramaSettings, **kwargs)
-        self._inputs = [camera_input(self, camera) for camera in self.settings.cameras]
-        for camera in self._inputs:
-            camera.start()
+        self._inputs, self._readers = camera_inputs(self)
+        for reader in self._readers:
+            reader.start()
 
     def destroy_node(self) -> None:
         """Release the cameras too."""
-        for camera in self._inputs:
-            camera.stop()
+        for reader in self._readers:
+            reader.stop()
         super().destroy_node()
 
     def _apply(self, settings: PanoramaSettings) -> None:
@@ -35,8 +35,8 @@ class PanoramaNode(PanoramaBase):
 
     def _report(self, report: Report) -> None:
         super()._report(report)
-        for camera in self._inputs:
-            camera.report(report)
+        for part in (*self._readers, *self._inputs):
+            part.report(report)
 
 
 def main() -> int:
