@@ -18,7 +18,7 @@ def surface_of(message: Projection) -> Surface:
     )
 
 
-def projection_of(surface: Surface, header: Header) -> Projection:
+def projection_of(surface: Surface, header: Header, *, wraps: bool = False) -> Projection:
     """Describe a surface in a message."""
     return Projection(
         header=header,
@@ -28,4 +28,5 @@ def projection_of(surface: Surface, header: Header) -> Projection:
         focal_px=surface.focal_px,
         center_x_px=surface.center_x_px,
         center_y_px=surface.center_y_px,
+        wraps=wraps,
     )

@@ -1,6 +1,7 @@
 """What stitch_node and panorama_node share: parameters, service, and the published panorama."""
 
 from collections import deque
+from collections.abc import Iterator
 from threading import Thread
 from time import monotonic
 
@@ -8,6 +9,7 @@ from fisheye_msgs.msg import Overlaps, Projection
 from fisheye_msgs.srv import CalibrateOverlap
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
+from sensor_msgs.msg import Imu
 from std_msgs.msg import Header
 
 from fisheye_bridge.awaiting import awaitable
@@ -20,9 +22,10 @@ from fisheye_bridge.diagnostics import (
     Report,
 )
 from fisheye_bridge.images import ImageBuffer
+from fisheye_bridge.imu import gravity_of
 from fisheye_bridge.parameters import Parameters
 from fisheye_bridge.projection import projection_of
-from fisheye_bridge.qos import LATCHED
+from fisheye_bridge.qos import BEST_EFFORT_INPUT, LATCHED
 from fisheye_bridge.stamps import stamp_of
 from fisheye_bridge.topics import ImagePublisher
 from fisheye_core.errors import FisheyeError, SettingError
@@ -36,13 +39,14 @@ from panorama_stitch.pipeline.metrics import (
     metrics,
     unpaired_sentence,
 )
-from panorama_stitch.pipeline.panorama_settings import PanoramaOutputSettings
+from panorama_stitch.pipeline.panorama_settings import MountSettings, PanoramaOutputSettings
 from panorama_stitch.pipeline.stitch_pipeline import Panorama, StitchPipeline
 
 FRAME_ID = 'panorama_optical_frame'
 _LATENCIES = 300
 _ANSWER_S = 10.0
 """Nobody waits longer for the answer of a service; what was asked for is done nevertheless."""
+_SILENT_IMU_S = 2.0
 
 
 class PanoramaBase(Node):
@@ -51,7 +55,11 @@ class PanoramaBase(Node):
     def __init__(self, name: str, settings: type[PanoramaOutputSettings], **kwargs):
         super().__init__(name, **kwargs)
         declared = Parameters(self, settings, on_change=self._apply)
-        self.pipeline = StitchPipeline(declared.settings)
+        mounts = [
+            Parameters(self, MountSettings, prefix=f'{camera}.').settings
+            for camera in declared.settings.cameras
+        ]
+        self.pipeline = StitchPipeline(declared.settings, mounts)
         self._buffer: ImageBuffer | None = None
         self._announced: Compositor | None = None
         self._handled, self._published, self._rate = 0, 0, RateMeter()
@@ -67,6 +75,8 @@ class PanoramaBase(Node):
             self._calibrate,
             callback_group=MutuallyExclusiveCallbackGroup(),
         )
+        self._imu_s: float | None = None
+        self.create_subscription(Imu, 'imu', self._take_imu, BEST_EFFORT_INPUT)
         self._diagnostics = Diagnostics(self, self._report)
         self._thread = Thread(target=self._publish_panoramas, name='compose', daemon=True)
         self._thread.start()
@@ -88,6 +98,12 @@ class PanoramaBase(Node):
 
     def _apply(self, settings: PanoramaOutputSettings) -> None:
         self.pipeline.apply(settings)
+
+    def _take_imu(self, message: Imu) -> None:
+        gravity = gravity_of(message)
+        if gravity is not None:
+            self._imu_s = monotonic()
+            self.pipeline.set_gravity(gravity)
 
     def _publish_panoramas(self) -> None:
         """Publish each panorama that the pipeline has, until it is stopped."""
@@ -117,7 +133,8 @@ class PanoramaBase(Node):
         """Publish what is in use from this panorama on, for those who come later too."""
         self._announced = panorama.compositor
         header = _header(panorama.stamp_ns)
-        self._projection.publish(projection_of(panorama.surface, header))
+        wraps = panorama.compositor.layout.wraps
+        self._projection.publish(projection_of(panorama.surface, header, wraps=wraps))
         overlaps = overlap_messages(self.pipeline.overlaps, self.pipeline.rig, FRAME_ID)
         self._overlaps.publish(Overlaps(header=header, overlaps=overlaps))
 
@@ -150,8 +167,8 @@ class PanoramaBase(Node):
             report.add(ERROR, f'no panorama yet: {pipeline.trouble or "in preparation"}')
         elif pipeline.trouble:
             report.add(WARN, pipeline.trouble)
-        if not all(result.found for result in pipeline.overlaps):
-            report.add(WARN, 'no overlap: frames are side by side')
+        for sentence in self._rig_faults():
+            report.add(WARN, sentence)
         if sentence := economy_sentence(pipeline):
             report.add(WARN, sentence)
         if pipeline.unpaired_s > self.settings.stale_after_s:
@@ -167,6 +184,19 @@ class PanoramaBase(Node):
         report.values['panoramas published'] = self._published
         report.values.update(metrics(pipeline))
         report.values.update(latency_metrics(self._latencies_ms))
+
+    def _rig_faults(self) -> Iterator[str]:
+        """Return what is wrong with the rig, in sentences."""
+        pipeline = self.pipeline
+        if pipeline.compositor is not None:
+            yield from pipeline.rig_faults
+        for camera, fault in pipeline.rig.faults.items():
+            yield f'{camera}: {fault}'
+        if self.settings.level == 'imu' and self._imu_s is None:
+            yield 'level is imu, but nothing came on the topic imu; level is symmetric so far'
+        elif self.settings.level == 'imu' and monotonic() - self._imu_s > _SILENT_IMU_S:
+            silent_s = monotonic() - self._imu_s
+            yield f'nothing came on the topic imu for {silent_s:.0f} s; the last level is held'
 
 
 def _header(stamp_ns: int) -> Header:

@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from itertools import pairwise
 from math import degrees
 
 from fisheye_msgs.msg import Overlap, Particle
 from std_msgs.msg import Header
 
 from fisheye_bridge.stamps import stamp_of
+from fisheye_geometry.attitude import LEVEL
+from fisheye_geometry.rig import pairs_of
 from fisheye_geometry.surface import Surface
 from panorama_stitch.overlap.overlap_result import Overlap as OverlapResult
 from panorama_stitch.overlap.overlap_result import yaw_between_rad
@@ -19,8 +20,18 @@ def overlap_messages(
     results: Sequence[OverlapResult], rig: RigState, frame_id: str
 ) -> list[Overlap]:
     """Return a message for the overlap of each pair of a rig, in its order."""
-    pairs = zip(results, pairwise(rig.cameras), pairwise(rig.surfaces), strict=True)
-    return [_message(result, names, surfaces, frame_id) for result, names, surfaces in pairs]
+    cameras, surfaces = rig.cameras, rig.surfaces
+    return [
+        _message(
+            result,
+            (cameras[left], cameras[right]),
+            (surfaces[left], surfaces[right]),
+            frame_id,
+        )
+        for result, (left, right) in zip(
+            results, pairs_of(len(cameras), len(results) == len(cameras) > 1), strict=True
+        )
+    ]
 
 
 def _message(
@@ -29,6 +40,7 @@ def _message(
     surfaces: tuple[Surface, Surface],
     frame_id: str,
 ) -> Overlap:
+    attitude = result.attitude or LEVEL
     return Overlap(
         header=Header(stamp=stamp_of(result.stamp_ns), frame_id=frame_id),
         left_camera=names[0],
@@ -38,8 +50,10 @@ def _message(
         offset_x_px=result.offset_x_px,
         offset_y_px=result.offset_y_px,
         offset_deg=degrees(yaw_between_rad(result.offset_x_px, *surfaces)),
-        pitch_deg=degrees(result.turn.pitch_rad),
-        roll_deg=degrees(result.turn.roll_rad),
+        yaw_deg=degrees(yaw_between_rad(result.offset_x_px, *surfaces)),
+        pitch_deg=degrees(attitude.pitch_rad),
+        roll_deg=degrees(attitude.roll_rad),
+        near_deg=result.near_deg,
         overlap_px=result.overlap_px,
         confidence=result.confidence,
         min_correlation_value=result.min_correlation_value,

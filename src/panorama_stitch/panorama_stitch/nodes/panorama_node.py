@@ -5,13 +5,17 @@ from fisheye_bridge.running import run
 from fisheye_capture.capture_settings import CameraSettings
 from panorama_stitch.nodes.base_node import PanoramaBase
 from panorama_stitch.nodes.camera_input import camera_inputs
-from panorama_stitch.pipeline.panorama_settings import PanoramaSettings
+from panorama_stitch.pipeline.panorama_settings import MountSettings, PanoramaSettings
 
 
 class PanoramaNode(PanoramaBase):
     """The cameras themselves to panorama/image."""
 
-    SETTINGS = (('', PanoramaSettings), ('CAMERA.', CameraSettings))
+    SETTINGS = (
+        ('', PanoramaSettings),
+        ('CAMERA.', CameraSettings),
+        ('CAMERA.', MountSettings),
+    )
 
     def __init__(self, **kwargs):
         self._inputs, self._readers = [], []

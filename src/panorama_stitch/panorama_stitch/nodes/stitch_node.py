@@ -14,13 +14,13 @@ from fisheye_core.errors import FisheyeError
 from fisheye_geometry.settling import Settling
 from fisheye_geometry.surface import Surface
 from panorama_stitch.nodes.base_node import PanoramaBase
-from panorama_stitch.pipeline.panorama_settings import PanoramaOutputSettings
+from panorama_stitch.pipeline.panorama_settings import MountSettings, PanoramaOutputSettings
 
 
 class StitchNode(PanoramaBase):
     """CAMERA/image_rect and CAMERA/projection of each camera to panorama/image."""
 
-    SETTINGS = (('', PanoramaOutputSettings),)
+    SETTINGS = (('', PanoramaOutputSettings), ('CAMERA.', MountSettings))
 
     def __init__(self, **kwargs):
         super().__init__('stitch', PanoramaOutputSettings, **kwargs)

@@ -7,18 +7,22 @@ from pathlib import Path
 
 from fisheye_core.errors import FileContentError, OverlapFileError
 from fisheye_core.yaml_file import is_missing, is_number, read_mapping, shown, write_mapping
-from fisheye_geometry.remap import Turn
+from fisheye_geometry.attitude import LEVEL, Attitude
+from fisheye_geometry.rig import Pair, pairs_of
 from fisheye_geometry.surface import Surface
-from panorama_stitch.overlap.overlap_result import Overlap
+from panorama_stitch.overlap.overlap_result import Overlap, attitude_at
 from panorama_stitch.overlap.overlap_settings import METHODS
 
-VERSION = 1
+VERSION = 2
+_READABLE = (1, 2)
+"""Version 1 knew offsets of level cameras and small tilts, no rotation."""
 _SIZE_KEYS = ('width', 'height')
 _LENGTH_KEYS = ('focal_px', 'center_x_px', 'center_y_px')
 _LENGTH_TOLERANCE_PX = 0.01
 """More than rounding, less than anybody sees."""
-_LARGEST_TILT_DEG = 45.0
+_LARGEST_TILT_DEG = {1: 45.0, 2: 180.0}
 _NUMBERS = ('offset_x_px', 'offset_y_px', 'pitch_deg', 'roll_deg', 'overlap_px', 'confidence')
+_NUMBERS_2 = (*_NUMBERS, 'near_deg')
 
 
 def write_overlaps(
@@ -36,7 +40,7 @@ def write_overlaps(
     cameras, surfaces
         Names from left to right, and what each camera's pictures are on.
     overlaps
-        One for each pair of neighbours.
+        One for each pair of neighbours, in a ring the closing one last.
 
     Raises
     ------
@@ -49,8 +53,8 @@ def write_overlaps(
             'version': VERSION,
             'cameras': [_camera(*camera) for camera in zip(cameras, surfaces, strict=True)],
             'overlaps': [
-                _entry(*neighbours)
-                for neighbours in zip(cameras[:-1], cameras[1:], overlaps, strict=True)
+                _entry(cameras[left], cameras[right], overlap)
+                for (left, right), overlap in zip(_pairs(cameras, overlaps), overlaps, strict=True)
             ],
         },
     )
@@ -74,22 +78,31 @@ def read_overlaps(
         return None
     try:
         entries = read_mapping(path)
-        if entries.get('version') != VERSION:
-            version = shown(entries.get('version'))
-            raise OverlapFileError(f'version is {version}; expected {VERSION}')
+        version = entries.get('version')
+        if version not in _READABLE:
+            expected = ' or '.join(map(str, _READABLE))
+            raise OverlapFileError(f'version is {shown(version)}; expected {expected}')
         _check_cameras(_list(entries, 'cameras'), cameras, surfaces)
         measured = _list(entries, 'overlaps')
-        if len(measured) != len(cameras) - 1:
+        pairs = _pairs(cameras, measured)
+        if len(measured) != len(pairs):
             raise OverlapFileError(
                 f'{len(measured)} overlaps for {len(cameras)} cameras; expected one for each '
                 'pair of neighbours'
             )
         return [
-            _overlap(*neighbours)
-            for neighbours in zip(cameras[:-1], cameras[1:], surfaces[:-1], measured, strict=True)
+            _overlap(
+                version, (cameras[left], cameras[right]), (surfaces[left], surfaces[right]), entry
+            )
+            for (left, right), entry in zip(pairs, measured, strict=True)
         ]
     except FileContentError as error:
         raise OverlapFileError(error.reason, path) from error
+
+
+def _pairs(cameras: Sequence[str], overlaps: Sequence) -> tuple[Pair, ...]:
+    """Return the pairs of neighbours that so many overlaps are for."""
+    return pairs_of(len(cameras), len(overlaps) == len(cameras) > 1)
 
 
 def _camera(name: str, surface: Surface) -> dict:
@@ -99,11 +112,14 @@ def _camera(name: str, surface: Surface) -> dict:
 
 
 def _entry(left: str, right: str, overlap: Overlap) -> dict:
+    attitude = overlap.attitude or LEVEL
     values = {
         'offset_x_px': overlap.offset_x_px,
         'offset_y_px': overlap.offset_y_px,
-        'pitch_deg': degrees(overlap.turn.pitch_rad),
-        'roll_deg': degrees(overlap.turn.roll_rad),
+        **({'yaw_deg': degrees(attitude.yaw_rad)} if overlap.attitude else {}),
+        'pitch_deg': degrees(attitude.pitch_rad),
+        'roll_deg': degrees(attitude.roll_rad),
+        'near_deg': overlap.near_deg,
         'overlap_px': overlap.overlap_px,
         'confidence': overlap.confidence,
     }
@@ -145,18 +161,26 @@ def _check_cameras(entries, cameras, surfaces) -> None:
             )
 
 
-def _overlap(left: str, right: str, surface: Surface, entry: dict) -> Overlap:
+def _overlap(
+    version: int, names: tuple[str, str], surfaces: tuple[Surface, Surface], entry: dict
+) -> Overlap:
+    left, right = names
+    surface = surfaces[0]
     pair = f"the overlap of '{left}' and '{right}'"
     if (entry.get('left'), entry.get('right')) != (left, right):
         neighbours = f'{shown(entry.get("left"))}, {shown(entry.get("right"))}'
         raise OverlapFileError(f'{pair} is missing; found {neighbours}')
+    # A rotation puts the right image anywhere, even on the left of the left one.
+    widest = surface.width if version == 1 else inf
     limits = {
-        'offset_x_px': surface.width,
-        'offset_y_px': surface.height,
-        'pitch_deg': _LARGEST_TILT_DEG,
-        'roll_deg': _LARGEST_TILT_DEG,
+        'offset_x_px': widest,
+        'offset_y_px': surface.height if version == 1 else inf,
+        'yaw_deg': 360.0,
+        'pitch_deg': _LARGEST_TILT_DEG[version],
+        'roll_deg': _LARGEST_TILT_DEG[version],
     }
-    for key in _NUMBERS:
+    has_yaw = version > 1 and 'yaw_deg' in entry
+    for key in (*(_NUMBERS if version == 1 else _NUMBERS_2), *(['yaw_deg'] if has_yaw else [])):
         value = entry.get(key)
         limit = limits.get(key, inf)
         if not is_number(value) or abs(value) > limit:
@@ -170,13 +194,21 @@ def _overlap(left: str, right: str, surface: Surface, entry: dict) -> Overlap:
         method, methods = shown(entry.get('method')), ', '.join(METHODS)
         raise OverlapFileError(f'method of {pair} is {method}; expected one of {methods}')
     message = entry.get('message')
+    x_px, y_px = float(entry['offset_x_px']), float(entry['offset_y_px'])
+    pitch_rad, roll_rad = radians(entry['pitch_deg']), radians(entry['roll_deg'])
+    attitude = None
+    if has_yaw:
+        attitude = Attitude(radians(entry['yaw_deg']), pitch_rad, roll_rad)
+    elif entry['found'] and version == 1:
+        attitude = attitude_at(x_px, y_px, *surfaces, Attitude(0.0, pitch_rad, roll_rad))
     return Overlap(
         method=entry['method'],
         found=entry['found'],
-        offset_x_px=float(entry['offset_x_px']),
-        offset_y_px=float(entry['offset_y_px']),
-        turn=Turn(0.0, radians(entry['pitch_deg']), radians(entry['roll_deg'])),
+        offset_x_px=x_px,
+        offset_y_px=y_px,
+        attitude=attitude,
         overlap_px=float(entry['overlap_px']),
         confidence=float(entry['confidence']),
+        near_deg=float(entry.get('near_deg', 0.0)),
         message=message if isinstance(message, str) else '',
     )

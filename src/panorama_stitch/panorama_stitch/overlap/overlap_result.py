@@ -1,33 +1,35 @@
 """What overlap calibration finds out about two neighbouring cameras."""
 
-from dataclasses import dataclass
-from math import nan
+from dataclasses import dataclass, replace
+from math import atan2, nan, tan
 
-from fisheye_geometry.remap import LEVEL, Turn
+from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.surface import Surface
 from panorama_stitch.overlap.particles import Particle
 
 
 @dataclass(frozen=True)
 class Overlap:
-    """Where the right picture lies in the left one, and how sure that is.
+    """Where the right image lies in the left one, and how sure that is.
 
     Attributes
     ----------
     method
         What decided, one of `METHODS`; 'manual' where a person did, '' where nothing did yet.
     found
-        False: no common scene; the offset puts the pictures side by side.
+        False: no common scene; the offset puts the images side by side.
     offset_x_px, offset_y_px
-        Where the right picture's upper left corner lies in the left picture, after the right
-        camera was turned by `turn`.
-    turn
-        The right camera's small turn that closes the seam; level where not measured.
+        Where the right image's upper left corner lies in the left image at the horizon; of a
+        rotation it follows once the rig is level.
+    attitude
+        Of the right camera in the frame of the left one; None where only an offset is known.
     overlap_px
-        Columns that both pictures fill.
+        Columns that both images fill.
     confidence
-        0 to 1: zero-mean normalised cross-correlation of the structure of the overlap, lowered
-        where a second offset is nearly as good.
+        0 to 1: by particles the probability that it is right within half a degree; else the
+        correlation of the overlap, lowered where a second offset is nearly as good.
+    near_deg
+        How far near things lie beside far ones.
     min_correlation_value
         The paper's measure for the matched particles; NaN where none matched.
     left_particles, right_particles
@@ -37,16 +39,17 @@ class Overlap:
     message
         One sentence for a person.
     stamp_ns
-        When the newest pictures were taken that it was measured on; 0 if it was not measured now.
+        When the newest images were taken that it was measured on; 0 if it was not measured now.
     """
 
     method: str
     found: bool
-    offset_x_px: float
-    offset_y_px: float
-    turn: Turn = LEVEL
+    offset_x_px: float = nan
+    offset_y_px: float = nan
+    attitude: Attitude | None = None
     overlap_px: float = 0.0
     confidence: float = 0.0
+    near_deg: float = 0.0
     min_correlation_value: float = nan
     left_particles: tuple[Particle, ...] = ()
     right_particles: tuple[Particle, ...] = ()
@@ -62,9 +65,9 @@ def yaw_between_rad(offset_x_px: float, left: Surface, right: Surface) -> float:
     Parameters
     ----------
     offset_x_px
-        Where the right picture's left edge lies in the left picture.
+        Where the right image's left edge lies in the left image.
     left, right
-        What the pictures are on, with one focal length.
+        What the images are on, with one focal length.
 
     Returns
     -------
@@ -84,4 +87,60 @@ def side_by_side(surface_left: Surface, method: str, message: str) -> Overlap:
         offset_x_px=float(surface_left.width),
         offset_y_px=0.0,
         message=message,
+    )
+
+
+def attitude_at(
+    offset_x_px: float, offset_y_px: float, left: Surface, right: Surface, tilt: Attitude
+) -> Attitude | None:
+    """Return the right camera's attitude in the left one's frame that an offset means.
+
+    Parameters
+    ----------
+    offset_x_px, offset_y_px
+        Where the right image's upper left corner lies in the left image.
+    left, right
+        What the images are on, with one focal length.
+    tilt
+        The right camera's pitch and roll with which the offset is meant.
+
+    Returns
+    -------
+    Attitude or None
+        None on a plane, where an offset is no angle.
+    """
+    if not left.yaw_is_column_shift:
+        return None
+    yaw_rad = yaw_between_rad(offset_x_px, left, right)
+    lower_px = offset_y_px - (left.center_y_px - right.center_y_px)
+    return Attitude(yaw_rad, tilt.pitch_rad - atan2(lower_px, left.focal_px), tilt.roll_rad)
+
+
+def with_offset(
+    overlap: Overlap, left: Surface, right: Surface, attitudes: tuple[Attitude, Attitude]
+) -> Overlap:
+    """Return an overlap with the offset that the level attitudes of both cameras mean.
+
+    Parameters
+    ----------
+    overlap
+        It.
+    left, right
+        What the corrected images of both are on.
+    attitudes
+        Of the left and of the right camera, the yaw of the right one after the left one's.
+    """
+    if overlap.attitude is None:
+        return overlap
+    yaw_rad = attitudes[1].yaw_rad - attitudes[0].yaw_rad
+    x_px = yaw_rad * left.focal_px + left.center_x_px - right.center_x_px
+    horizons_px = [
+        surface.center_y_px + surface.focal_px * tan(attitude.pitch_rad)
+        for surface, attitude in zip((left, right), attitudes, strict=True)
+    ]
+    return replace(
+        overlap,
+        offset_x_px=x_px,
+        offset_y_px=horizons_px[0] - horizons_px[1],
+        overlap_px=max(0.0, min(left.width - x_px, right.width)),
     )

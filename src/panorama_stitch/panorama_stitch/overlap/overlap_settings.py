@@ -6,6 +6,7 @@ from math import nan
 from fisheye_core.settings import setting
 
 METHODS = ('particles', 'correlation', 'paper')
+"""Names of the methods; `overlap.methods` has them as functions."""
 
 
 @dataclass(frozen=True)
@@ -14,8 +15,8 @@ class OverlapSettings:
 
     method: str = setting(
         'particles',
-        'How the overlap is found: particles propose offsets and correlation verifies them, '
-        'correlation over all offsets, or the published rule as it is.',
+        'How the overlap is found: particles measures the rotation on many local votes, correlation '
+        'searches all offsets of the corrected images, paper is the published rule as it is.',
         choices=METHODS,
         live=True,
     )

@@ -12,7 +12,6 @@ from panorama_stitch.overlap.alignment import align, overlap_score, refine
 from panorama_stitch.overlap.correlation import ScoreMap, correlate
 from panorama_stitch.overlap.particles import facing_halves
 from panorama_stitch.overlap.pose import Pose
-from panorama_stitch.overlap.proposals import Proposals, propose
 from panorama_stitch.overlap.structure import FacingPair, face
 
 _SEARCH_PX_PER_DEG, _FINE_PX_PER_DEG = 2.0, 4.0
@@ -68,18 +67,12 @@ class Registration:
         Correlation of the structure of the overlap, less what chance may give; 0 to 1.
     rival_fit, rival_x_px
         The fit of the best other offset, and where that is.
-    proposals
-        The particles that proposed it, px of the halves; None where the full search did.
-    match
-        The left and the right one of the pair that fits the pose best, -1 where none does.
     """
 
     pose: Pose
     fit: float = 0.0
     rival_fit: float = 0.0
     rival_x_px: float = 0.0
-    proposals: Proposals | None = None
-    match: tuple[int, int] = (-1, -1)
 
     @property
     def distinct(self) -> float:
@@ -101,8 +94,6 @@ def register(
     surface_left: Surface,
     surface_right: Surface,
     search: Search,
-    *,
-    by_particles: bool,
 ) -> Registration:
     """Find where the facing halves of two grey pictures overlap.
 
@@ -114,8 +105,6 @@ def register(
         What they show.
     search
         Where to look.
-    by_particles
-        Whether particles propose the offsets, and the full search only where none of theirs holds.
 
     Returns
     -------
@@ -129,14 +118,7 @@ def register(
     if landscape is None:
         return Registration(Pose(0.0, 0.0))
     offsets = landscape.peaks(_CANDIDATES, round(_APART_DEG * facing.px_per_deg))
-    proposals, proposed = None, []
-    if by_particles:
-        proposals = propose(facing, search.max_rise_deg * facing.px_per_deg)
-        proposed = proposals.offsets(landscape, _CANDIDATES)
-    best = _verify(facing, landscape, {*proposed, *offsets}, search.tilt)
-    if any(abs(x - best.pose.x_px) <= _APART_DEG * facing.px_per_deg for x, _ in proposed):
-        match = proposals.match_at(best.pose.x_px, best.pose.y_px)
-        best = replace(best, proposals=proposals.scaled(facing.step), match=match)
+    best = _verify(facing, landscape, offsets, search.tilt)
     pose = best.pose.scaled(facing.step)
     if best.confidence >= search.min_confidence:
         pose = _refine(left, right, surface_right, level_y_px, pose, search.tilt)

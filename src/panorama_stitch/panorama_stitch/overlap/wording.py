@@ -2,10 +2,11 @@
 
 from math import degrees, isnan, nan
 
+from fisheye_geometry.attitude import LEVEL, Attitude
 from fisheye_geometry.surface import Surface
 from panorama_stitch.overlap.overlap_result import Overlap, yaw_between_rad
 
-_SHOWN_PX, _SHOWN_DEG = 0.5, 0.05
+_SHOWN_DEG = 0.05
 """Less is level for a person."""
 
 
@@ -22,10 +23,8 @@ def description(overlap: Overlap, left: Surface, right: Surface, rival_x_px: flo
         A second offset that is nearly as good; NaN if there is none.
     """
     parts = [f'the right view begins at {place(overlap.offset_x_px, left, right)}']
-    lower_px = overlap.offset_y_px - (left.center_y_px - right.center_y_px)
-    if abs(lower_px) >= _SHOWN_PX:
-        parts.append(f'{abs(lower_px):.1f} px {"lower" if lower_px > 0 else "higher"} than level')
-    pitch, roll = degrees(overlap.turn.pitch_rad), degrees(overlap.turn.roll_rad)
+    tilt = overlap.attitude or LEVEL
+    pitch, roll = degrees(tilt.pitch_rad), degrees(tilt.roll_rad)
     if max(abs(pitch), abs(roll)) >= _SHOWN_DEG:
         parts.append(f'its camera pitched by {pitch:.2f} and rolled by {roll:.2f} degrees')
     parts.append(f'confidence {overlap.confidence:.2f}')
@@ -35,7 +34,7 @@ def description(overlap: Overlap, left: Surface, right: Surface, rival_x_px: flo
 
 
 def repetition(here_px: float, there_px: float, left: Surface, right: Surface) -> str:
-    """Say that two offsets fit alike."""
+    """Return the sentence that two offsets fit alike."""
     here, there = (place(offset_px, left, right) for offset_px in (here_px, there_px))
     return (
         f'the scene repeats itself: {here} and {there} fit alike; set expected_yaw_deg or '
@@ -44,7 +43,16 @@ def repetition(here_px: float, there_px: float, left: Surface, right: Surface) -
 
 
 def place(offset_x_px: float, left: Surface, right: Surface) -> str:
-    """Give an offset in px and, where there is one, the angle that it means."""
+    """Return an offset in px and, where there is one, the angle that it means."""
     text = f'{offset_x_px:.1f} px'
     apart = yaw_between_rad(offset_x_px, left, right)
     return text if isnan(apart) else f'{text} ({degrees(apart):.2f} degrees)'
+
+
+def direction(attitude: Attitude) -> str:
+    """Describe where the right camera looks in the frame of the left one."""
+    words = f'the right camera looks {degrees(attitude.yaw_rad):.2f} degrees to the right'
+    pitch, roll = degrees(attitude.pitch_rad), degrees(attitude.roll_rad)
+    if max(abs(pitch), abs(roll)) >= _SHOWN_DEG:
+        words += f', pitched by {pitch:.2f} and rolled by {roll:.2f} degrees'
+    return words

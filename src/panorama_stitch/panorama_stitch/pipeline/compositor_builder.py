@@ -181,13 +181,11 @@ class CompositorBuilder:
         remembered, surfaces = self._remembered(), rig.surfaces
         measured = self._measured(remembered, settings, method or settings.method)
         if settings.method != 'paper':
-            pairs = zip(measured, surfaces[:-1], strict=True)
-            measured = [_believed(new, surface, settings.min_confidence) for new, surface in pairs]
-        former = rig.overlaps or measured
-        overlaps = [
-            new if new.found or not old.found else old
-            for new, old in zip(measured, former, strict=True)
-        ]
+            measured = [
+                _believed(new, surfaces[index % len(surfaces)], settings.min_confidence)
+                for index, new in enumerate(measured)
+            ]
+        overlaps = _kept(measured, rig.overlaps or [])
         if save and all(overlap.found for overlap in measured):
             write_overlaps(settings.overlap_file, rig.cameras, surfaces, overlaps)
         if not rig.set_overlaps(overlaps, surfaces):
@@ -218,6 +216,17 @@ class CompositorBuilder:
                 rig.set_overlaps(overlaps, surfaces)
         except FisheyeError as error:
             self.tell(f'{error}; the overlap is measured instead')
+
+
+def _kept(measured: list[Overlap], former: list[Overlap]) -> list[Overlap]:
+    """Return what was measured, but what was found before where nothing was found now."""
+    if len(former) != len(measured):
+        # A ring was closed or opened; it is whole only with what was measured together.
+        return measured if all(new.found for new in measured) or not former else former
+    return [
+        new if new.found or not old.found else old
+        for new, old in zip(measured, former, strict=True)
+    ]
 
 
 def _believed(result: Overlap, left: Surface, needed: float) -> Overlap:

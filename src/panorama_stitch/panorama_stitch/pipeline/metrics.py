@@ -1,7 +1,6 @@
 """What the pipeline reports of itself: numbers, and a sentence about clocks that differ."""
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 
@@ -28,8 +27,8 @@ def metrics(pipeline: StitchPipeline) -> dict[str, float | str]:
     if len(skews_ms):
         values['skew median ms'] = float(np.median(skews_ms))
         values['skew worst ms'] = float(skews_ms.max())
-    for (left, right), overlap in zip(pairwise(cameras), pipeline.overlaps, strict=False):
-        pair = f'{left}-{right}'
+    for pair_of, overlap in zip(pipeline.rig.pairs, pipeline.overlaps, strict=False):
+        pair = f'{cameras[pair_of.left]}-{cameras[pair_of.right]}'
         values[f'{pair} overlap'] = f'found by {overlap.method}' if overlap.found else 'none'
         values[f'{pair} offset px'] = overlap.offset_x_px
         values[f'{pair} confidence'] = overlap.confidence

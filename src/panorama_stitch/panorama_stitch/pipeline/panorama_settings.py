@@ -2,11 +2,13 @@
 
 import re
 from dataclasses import dataclass
-from math import isnan, nan
+from math import isnan, nan, radians
 
 from fisheye_capture.capture_settings import FrameSettings
 from fisheye_core.errors import SettingError
 from fisheye_core.settings import setting
+from fisheye_geometry.level import LEVELS, Mount
+from fisheye_geometry.rig import MAX_CAMERAS, RINGS
 from fisheye_undistort.undistort_settings import SurfaceSettings
 from panorama_stitch.compose.compositor import BLENDS
 from panorama_stitch.compose.layout import CROPS
@@ -87,6 +89,46 @@ class PanoramaOutputSettings(OverlapSettings):
         maximum=60.0,
         live=True,
     )
+    ring: str = setting(
+        'auto',
+        'Whether the last camera meets the first: auto as they show, open never, closed for sure.',
+        choices=RINGS,
+        live=True,
+    )
+    level: str = setting(
+        'symmetric',
+        'What is level: symmetric where the outer cameras pitch and roll alike, first the first '
+        'camera, imu as gravity on the topic imu says, none as the cameras are mounted.',
+        choices=LEVELS,
+        live=True,
+    )
+    level_yaw_deg: float = setting(
+        0.0,
+        'Turns the level panorama to the right, deg.',
+        minimum=-180.0,
+        maximum=180.0,
+        live=True,
+    )
+    level_pitch_deg: float = setting(
+        0.0, 'Turns the level panorama up, deg.', minimum=-90.0, maximum=90.0, live=True
+    )
+    level_roll_deg: float = setting(
+        0.0, 'Turns the level panorama clockwise, deg.', minimum=-180.0, maximum=180.0, live=True
+    )
+    align_distance_m: float = setting(
+        0.0,
+        'Distance at which neighbouring views are made to agree, given baseline_m; 0: far away.',
+        minimum=0.0,
+        maximum=1000.0,
+        live=True,
+    )
+    baseline_m: float = setting(
+        0.0,
+        'Distance between neighbouring lenses, for align_distance_m; 0: not known.',
+        minimum=0.0,
+        maximum=10.0,
+        live=True,
+    )
     jpeg_quality: int = setting(
         80, 'Quality of the compressed panorama.', minimum=1, maximum=100, live=True
     )
@@ -94,9 +136,9 @@ class PanoramaOutputSettings(OverlapSettings):
     def __post_init__(self):
         """Refuse names and numbers that do not belong together."""
         cameras, pairs = self.cameras, len(self.cameras) - 1
-        if pairs < 1 or len(set(cameras)) != len(cameras):
+        if not 1 <= len(cameras) <= MAX_CAMERAS or len(set(cameras)) != len(cameras):
             raise SettingError(
-                f'cameras is {list(cameras)}; expected at least two different names'
+                f'cameras is {list(cameras)}; expected 1 to {MAX_CAMERAS} different names'
             )
         for name in cameras:
             if not _NAME.fullmatch(name):
@@ -110,6 +152,42 @@ class PanoramaOutputSettings(OverlapSettings):
                     f'{name} has {len(values)} numbers; expected {pairs}, one for each '
                     'neighbouring pair'
                 )
+
+
+@dataclass(frozen=True)
+class MountSettings:
+    """What is known of a camera before anything is seen; its parameters lie behind its name."""
+
+    yaw_deg: float = setting(
+        nan,
+        'How far the camera is turned to the right, deg; NaN: not known.',
+        minimum=-360.0,
+        maximum=360.0,
+        nan=True,
+    )
+    pitch_deg: float = setting(
+        nan,
+        'How far the camera is turned up, deg; NaN: not known.',
+        minimum=-90.0,
+        maximum=90.0,
+        nan=True,
+    )
+    roll_deg: float = setting(
+        nan,
+        'How far the camera is turned clockwise as it sees it, deg (upside down: 180); NaN: not '
+        'known.',
+        minimum=-360.0,
+        maximum=360.0,
+        nan=True,
+    )
+    mask_file: str = setting(
+        '', 'Image of the size of the camera, white where the camera sees the robot itself.'
+    )
+
+    @property
+    def mount(self) -> Mount:
+        """The angles."""
+        return Mount(*map(radians, (self.yaw_deg, self.pitch_deg, self.roll_deg)))
 
 
 @dataclass(frozen=True)

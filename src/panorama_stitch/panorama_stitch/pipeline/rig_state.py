@@ -1,26 +1,41 @@
-"""What is known of the rig: what each camera shows and the overlaps between neighbours."""
+"""What is known of the rig: what each camera shows, how it is mounted, and what was measured."""
 
 from collections.abc import Sequence
-from dataclasses import replace
-from math import isnan, nan
+from dataclasses import dataclass, replace
+from math import isnan, nan, radians
 from threading import Lock
-from typing import NamedTuple
 
 import numpy as np
 
-from fisheye_core.errors import ImageFormatError, OverlapError
+from fisheye_core.errors import FisheyeError, ImageFormatError, OverlapError
+from fisheye_geometry.attitude import LEVEL, Attitude, rotation_matrix
 from fisheye_geometry.lens import Lens
+from fisheye_geometry.level import Mount
+from fisheye_geometry.rig import Pair, pairs_of, unwrapped
+from fisheye_geometry.rig_solution import RigSolution, solve_rig
 from fisheye_geometry.surface import Surface
 from panorama_stitch.compose.build import Style, build_compositor
 from panorama_stitch.compose.compositor import Compositor
-from panorama_stitch.compose.posing import views_at_overlaps
+from panorama_stitch.compose.mask import read_mask
+from panorama_stitch.compose.placing import leads_around
+from panorama_stitch.compose.posing import views_at_overlaps, views_of_rig
 from panorama_stitch.compose.view import View
-from panorama_stitch.overlap.measure_overlap import measure_overlap
-from panorama_stitch.overlap.overlap_result import Overlap, side_by_side
+from panorama_stitch.overlap.methods import METHODS, CameraView, PairInput
+from panorama_stitch.overlap.overlap_result import (
+    Overlap,
+    attitude_at,
+    side_by_side,
+    with_offset,
+)
 from panorama_stitch.pipeline.panorama_settings import PanoramaOutputSettings
 
 Images = Sequence[np.ndarray]
 """One image of each camera, taken at the same time."""
+
+_MOUNT_RAD, _YAW_MOUNT_RAD = radians(20.0), radians(60.0)
+"""How far a rotation may be from what mounts say: all three angles of both, or their yaw only."""
+_CLOSING_RAD = radians(10.0)
+"""How far the closing rotation of a ring may be from what the others leave for it."""
 
 
 class RigState:
@@ -31,12 +46,39 @@ class RigState:
     cameras
         Names from left to right.
     overlaps
-        One for each neighbouring pair as measured or read; None before.
+        One for each of `pairs` as measured or read; None before.
+    faults
+        For each camera what is wrong with what was said of it, a sentence.
+    gravity
+        Where things fall in the frame of the robot, (3,) with x right, y down, z ahead; None
+        while that is not known.
     """
 
-    def __init__(self, cameras: Sequence[str]):
+    def __init__(
+        self,
+        cameras: Sequence[str],
+        mounts: Sequence[Mount] = (),
+        mask_files: Sequence[str] = (),
+    ):
+        """Start with what is known before anything is seen.
+
+        Parameters
+        ----------
+        cameras
+            Names from left to right.
+        mounts
+            What is known of how each is mounted; () for nothing.
+        mask_files
+            Of each the image that is white where it sees the robot itself; '' for none, () for
+            none of them.
+        """
         self.cameras = tuple(cameras)
         self.overlaps: list[Overlap] | None = None
+        self.gravity: np.ndarray | None = None
+        self._mounts = tuple(mounts) or (Mount(),) * len(self.cameras)
+        self._mask_files = tuple(mask_files) or ('',) * len(self.cameras)
+        self._bodies: list[np.ndarray | None] = [None] * len(self.cameras)
+        self.faults: dict[str, str] = {}
         self._places: dict[int, _Place] = {}
         self._lock = Lock()
 
@@ -44,6 +86,12 @@ class RigState:
     def is_complete(self) -> bool:
         """Whether it is known what every camera sees."""
         return len(self._places) == len(self.cameras)
+
+    @property
+    def pairs(self) -> tuple[Pair, ...]:
+        """Neighbours, the closing pair of a ring last; one for each of the overlaps."""
+        is_closed = self.overlaps is not None and len(self.overlaps) == len(self.cameras) > 1
+        return pairs_of(len(self.cameras), is_closed)
 
     @property
     def surfaces(self) -> list[Surface]:
@@ -70,6 +118,7 @@ class RigState:
         _with_one_focal({**self._places, index: place})
         with self._lock:
             self._places[index] = place
+            self._bodies[index] = self._body(index, source)
             if former and former.surface != surface:
                 self.overlaps = None
         return True
@@ -87,23 +136,23 @@ class RigState:
         return self.cameras.index(camera) in self._places
 
     def check(self, camera: str, image: np.ndarray) -> None:
-        """Raise an `ImageFormatError` for a image of another size than the camera's."""
+        """Raise an `ImageFormatError` for an image of another size than the camera's."""
         place = self._places.get(self.cameras.index(camera))
         if place and image.shape[:2] != (place.source.height, place.source.width):
             raise ImageFormatError(
-                f'the image of {camera} has {image.shape[1]}x{image.shape[0]} px; '
+                f'the picture of {camera} has {image.shape[1]}x{image.shape[0]} px; '
                 f'expected {place.source.width}x{place.source.height} px'
             )
 
     def black(self, camera: str, channels: tuple[int, ...]) -> np.ndarray:
-        """Return a image for a camera that never gave one, (height, width, *channels) uint8."""
+        """Return an image for a camera that never gave one, (height, width, *channels) uint8."""
         source = self._places[self.cameras.index(camera)].source
         return np.zeros((source.height, source.width, *channels), np.uint8)
 
     def measure(
         self, frame_sets: Sequence[Images], settings: PanoramaOutputSettings, method: str
     ) -> list[Overlap]:
-        """Measure the overlap of each neighbouring pair.
+        """Measure the overlap of each pair of neighbours, the closing one of a ring too.
 
         Parameters
         ----------
@@ -114,6 +163,11 @@ class RigState:
         method
             One of `METHODS`, in place of the settings' own.
 
+        Returns
+        -------
+        list of Overlap
+            One for each pair; if the rig leads all around one for the closing pair too.
+
         Raises
         ------
         OverlapError
@@ -123,31 +177,52 @@ class RigState:
         """
         if not frame_sets:
             raise OverlapError('no pair of frames has come yet; are all cameras running?')
-        views = self._views(frame_sets[0])
-        overlaps = []
-        for i in range(len(views) - 1):
-            pairs = [
-                (views[i].corrected(images[i]), views[i + 1].corrected(images[i + 1]))
-                for images in frame_sets
-            ]
-            overlap = measure_overlap(
-                pairs, views[i].surface, views[i + 1].surface, settings, method
-            )
-            views[i + 1] = replace(views[i + 1], attitude=overlap.turn)
-            overlaps.append(overlap)
-        return overlaps
+        for images in frame_sets:
+            for camera, image in zip(self.cameras, images, strict=True):
+                self.check(camera, image)
+        measure = METHODS[method]
+        overlaps = [
+            measure(self._pair_input(pair, frame_sets), settings)
+            for pair in pairs_of(len(self.cameras))
+        ]
+        closing = self._closing(overlaps, settings)
+        if closing:
+            first = replace(self._pair_input(closing[0], frame_sets), **closing[1])
+            overlaps.append(measure(first, settings))
+        return self._with_offsets(overlaps, settings)
 
     def effective_overlaps(self, settings: PanoramaOutputSettings) -> list[Overlap]:
         """Return the overlaps, with what was set by hand in place of what was measured."""
-        pairs = len(self.cameras) - 1
+        surfaces, pairs = self.surfaces, self.pairs
+        measured = self.overlaps or [
+            side_by_side(surfaces[pair.left], '', 'not measured yet') for pair in pairs
+        ]
         by_hand = [
-            [nan] * pairs if all(map(isnan, values)) else values
+            [*values, *[nan] * len(pairs)][: len(pairs)]
+            if not all(map(isnan, values))
+            else [nan] * len(pairs)
             for values in (settings.offset_x_px, settings.offset_y_px)
         ]
-        measured = self.overlaps or [
-            side_by_side(surface, '', 'not measured yet') for surface in self.surfaces[:-1]
+        return [
+            _set_by_hand(overlap, x_px, y_px, surfaces[pair.left], surfaces[pair.right])
+            for overlap, pair, x_px, y_px in zip(measured, pairs, *by_hand, strict=True)
         ]
-        return [_set_by_hand(*entry) for entry in zip(measured, *by_hand, strict=True)]
+
+    def solution(
+        self, overlaps: Sequence[Overlap], settings: PanoramaOutputSettings
+    ) -> RigSolution:
+        """Return the rig that overlaps, mounts and level make; see `solve_rig`."""
+        extra = Attitude(
+            *(radians(getattr(settings, f'level_{name}_deg')) for name in ('yaw', 'pitch', 'roll'))
+        )
+        how, gravity = settings.level, None
+        if how == 'imu' and self.gravity is None:
+            how = 'symmetric'
+        elif how == 'imu':
+            # What the imu feels is in the robot's frame, in which the mounts are symmetric.
+            robot = self._solve(overlaps, settings, level='symmetric').rig
+            gravity = robot.cameras[0].attitude.matrix.T @ self.gravity
+        return self._solve(overlaps, settings, level=how, gravity=gravity, extra=extra)
 
     def compositor(self, settings: PanoramaOutputSettings, images: Images) -> Compositor:
         """Build what composes panoramas.
@@ -163,33 +238,125 @@ class RigState:
         Raises
         ------
         ImageFormatError
-            If a image cannot be what its camera is known to give.
+            If an image cannot be what its camera is known to give.
         GeometryError
             If the surfaces cannot be joined.
         """
         overlaps = self.effective_overlaps(settings)
-        is_found = all(overlap.found for overlap in overlaps)
+        views, wraps, is_whole = self._views(overlaps, settings, images)
         style = Style(
             blend=settings.blend,
             fade_rad=np.radians(settings.feather_deg),
-            crop=settings.crop if is_found else 'none',
+            crop=settings.crop if is_whole else 'none',
             is_gain_compensated=settings.gain_compensation,
         )
-        return build_compositor(views_at_overlaps(self._views(images), overlaps), images, style)
+        return build_compositor(views, images, style, wraps=wraps)
 
-    def _views(self, images: Images) -> list[View]:
-        views = []
-        for index, surface in sorted(_with_one_focal(self._places).items()):
-            image, place = images[index], self._places[index]
-            self.check(self.cameras[index], image)
-            seen = None
-            if isinstance(place.source, Surface):
-                seen = image > 0 if image.ndim == 2 else image.any(axis=2)
-            views.append(View(place.source, surface, place.interpolation, seen=seen))
-        return views
+    def _views(
+        self, overlaps: Sequence[Overlap], settings: PanoramaOutputSettings, images: Images
+    ) -> tuple[list[View], bool, bool]:
+        """Return the views of all cameras, whether they lead all around, and whether all fit."""
+        surfaces, places = self.surfaces, [self._places[i] for i in range(len(self.cameras))]
+        seen = []
+        for camera, place, image in zip(self.cameras, places, images, strict=True):
+            self.check(camera, image)
+            is_lens = not isinstance(place.source, Surface)
+            seen.append(None if is_lens else image > 0 if image.ndim == 2 else image.any(axis=2))
+        if not surfaces[0].yaw_is_column_shift:
+            level = [
+                View(place.source, surface, place.interpolation, seen=shows, body=body)
+                for place, surface, shows, body in zip(
+                    places, surfaces, seen, self._bodies, strict=True
+                )
+            ]
+            views = views_at_overlaps(level, overlaps[: len(level) - 1])
+            return views, False, all(overlap.found for overlap in overlaps)
+        rig = self.solution(overlaps, settings).rig
+        views = views_of_rig(
+            rig,
+            surfaces,
+            interpolation=places[0].interpolation,
+            seen=seen,
+            bodies=self._bodies,
+        )
+        wraps = settings.ring != 'open' and not rig.apart and leads_around(views)
+        return views, wraps, not rig.apart
+
+    def _solve(self, overlaps, settings, **how) -> RigSolution:
+        count = len(self.cameras)
+        rotations = [_rotation(overlap, settings) for overlap in overlaps]
+        return solve_rig(
+            [(name, self._places[i].source) for i, name in enumerate(self.cameras)],
+            rotations[: count - 1],
+            closing=rotations[count - 1] if len(rotations) == count else None,
+            mounts=self._mounts,
+            ring=settings.ring,
+            **how,
+        )
+
+    def _pair_input(self, pair: Pair, frame_sets: Sequence[Images]) -> PairInput:
+        surfaces = self.surfaces
+        left, right = (
+            CameraView(self._places[i].source, surfaces[i], self._bodies[i]) for i in pair
+        )
+        images = [(each[pair.left], each[pair.right]) for each in frame_sets]
+        one, other = self._mounts[pair.left], self._mounts[pair.right]
+        if one.is_known and other.is_known:
+            expected = Attitude.of(one.attitude.matrix.T @ other.attitude.matrix)
+            return PairInput(left, right, images, expected, _MOUNT_RAD)
+        if not (isnan(one.yaw_rad) or isnan(other.yaw_rad)):
+            expected = Attitude(yaw_rad=other.yaw_rad - one.yaw_rad)
+            return PairInput(left, right, images, expected, _YAW_MOUNT_RAD)
+        return PairInput(left, right, images)
+
+    def _closing(
+        self, overlaps: list[Overlap], settings: PanoramaOutputSettings
+    ) -> tuple[Pair, dict] | None:
+        """Return the pair that closes the ring and where its rotation is expected, if one does."""
+        count, surfaces = len(self.cameras), self.surfaces
+        if count < 2 or settings.ring == 'open' or not surfaces[0].yaw_is_column_shift:
+            return None
+        pair = pairs_of(count, is_closed=True)[-1]
+        if not all(overlap.found and overlap.attitude for overlap in overlaps):
+            return (pair, {}) if settings.ring == 'closed' else None
+        rig = self._solve(overlaps, settings, level='symmetric').rig
+        if not leads_around(views_of_rig(rig, surfaces)):
+            return (pair, {}) if settings.ring == 'closed' else None
+        return pair, {'expected': rig.relative(pair), 'within_rad': _CLOSING_RAD}
+
+    def _with_offsets(
+        self, overlaps: list[Overlap], settings: PanoramaOutputSettings
+    ) -> list[Overlap]:
+        """Return overlaps with the offsets that their rotations mean once the rig is level."""
+        surfaces = self.surfaces
+        rig = self.solution(overlaps, settings).rig
+        result = []
+        for overlap, pair in zip(
+            overlaps, pairs_of(len(self.cameras), len(overlaps) == len(self.cameras)), strict=True
+        ):
+            left, right = (rig.cameras[i].attitude for i in pair)
+            yaw_rad = unwrapped([left.yaw_rad, right.yaw_rad])[1]
+            attitudes = left, replace(right, yaw_rad=yaw_rad)
+            result.append(
+                with_offset(overlap, surfaces[pair.left], surfaces[pair.right], attitudes)
+            )
+        return result
+
+    def _body(self, index: int, source: Lens | Surface) -> np.ndarray | None:
+        """Read where a camera sees the robot itself; None where that is not known."""
+        camera, path = self.cameras[index], self._mask_files[index]
+        self.faults.pop(camera, None)
+        if not path:
+            return None
+        try:
+            return read_mask(path, source.width, source.height)
+        except FisheyeError as error:
+            self.faults[camera] = f'{error}; nothing is masked'
+            return None
 
 
-class _Place(NamedTuple):
+@dataclass(frozen=True)
+class _Place:
     """What a camera's images show, and how they are drawn on which surface."""
 
     source: Lens | Surface
@@ -209,14 +376,46 @@ def _with_one_focal(places: dict[int, _Place]) -> dict[int, Surface]:
     }
 
 
-def _set_by_hand(measured: Overlap, x_px: float, y_px: float) -> Overlap:
+def _set_by_hand(
+    measured: Overlap, x_px: float, y_px: float, left: Surface, right: Surface
+) -> Overlap:
     if isnan(x_px) and isnan(y_px):
         return measured
+    x_px = measured.offset_x_px if isnan(x_px) else x_px
+    if isnan(y_px):
+        y_px = measured.offset_y_px
+    elif measured.attitude is None:
+        y_px = float(y_px)
+    found = measured.found or x_px != measured.offset_x_px
+    tilt = measured.attitude or LEVEL
+    attitude = attitude_at(x_px, y_px, left, right, tilt) if found else None
+    if attitude and measured.attitude:
+        # What was measured says how both images lie; by hand they are only moved.
+        level_px = measured.offset_y_px
+        moved = attitude_at(x_px, y_px - level_px, left, left, LEVEL)
+        attitude = replace(attitude, pitch_rad=tilt.pitch_rad + moved.pitch_rad)
     return replace(
         measured,
         method='manual',
-        found=measured.found or not isnan(x_px),
-        offset_x_px=measured.offset_x_px if isnan(x_px) else x_px,
-        offset_y_px=measured.offset_y_px if isnan(y_px) else y_px,
+        found=found,
+        offset_x_px=x_px,
+        offset_y_px=y_px,
+        attitude=attitude,
         message='set by hand',
     )
+
+
+def _rotation(overlap: Overlap, settings: PanoramaOutputSettings) -> np.ndarray | None:
+    """Return the rotation (3, 3) of right rays to left ones to be drawn with; None if unknown.
+
+    Lenses that are apart see near things turned towards each other: at a distance the views agree
+    where the right one is turned by baseline / distance about the normal of both axes.
+    """
+    if not overlap.found or overlap.attitude is None:
+        return None
+    matrix, distance_m = overlap.attitude.matrix, settings.align_distance_m
+    if not (settings.baseline_m and distance_m):
+        return matrix
+    axis = np.cross((0.0, 0.0, 1.0), matrix[:, 2])
+    angle_rad = settings.baseline_m / distance_m
+    return rotation_matrix(axis / np.linalg.norm(axis) * angle_rad) @ matrix

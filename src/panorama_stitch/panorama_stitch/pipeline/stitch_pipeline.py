@@ -25,10 +25,12 @@ from panorama_stitch.overlap.overlap_result import Overlap
 from panorama_stitch.pipeline.compositor_builder import CompositorBuilder
 from panorama_stitch.pipeline.economy import Economy
 from panorama_stitch.pipeline.pairing import FramePairing
-from panorama_stitch.pipeline.panorama_settings import PanoramaOutputSettings
+from panorama_stitch.pipeline.panorama_settings import MountSettings, PanoramaOutputSettings
 from panorama_stitch.pipeline.rig_state import RigState
 from panorama_stitch.pipeline.stale import StaleCameras, write_age
 
+_GRAVITY_RAD = np.radians(0.5)
+"""A panorama is levelled anew when gravity has turned by more."""
 _WAITING = 2
 """Frame sets that may wait to be composed: a moment without the processor loses none."""
 _ROOM = 2.0
@@ -119,10 +121,22 @@ class StitchPipeline:
         Whether there is time for all that blends can do.
     """
 
-    def __init__(self, settings: PanoramaOutputSettings):
-        """Start with settings, which also say which cameras there are."""
+    def __init__(self, settings: PanoramaOutputSettings, mounts: Sequence[MountSettings] = ()):
+        """Start.
+
+        Parameters
+        ----------
+        settings
+            Also say which cameras there are.
+        mounts
+            What is known of each camera; () for nothing.
+        """
         self.settings = settings
-        self.rig = RigState(settings.cameras)
+        self.rig = RigState(
+            settings.cameras,
+            [mount.mount for mount in mounts],
+            [mount.mask_file for mount in mounts],
+        )
         self.pairing = FramePairing(settings.cameras, round(settings.max_pair_skew_s * 1e9))
         self.rates = {camera: RateMeter() for camera in settings.cameras}
         self.broken = 0
@@ -193,6 +207,14 @@ class StitchPipeline:
             self.pairing.max_skew_ns = round(settings.max_pair_skew_s * 1e9)
         self._builder.renew(forget=False)
 
+    def set_gravity(self, gravity: np.ndarray) -> None:
+        """Level the panorama by where things fall, (3,) in the robot's frame; see `RigState`."""
+        former, self.rig.gravity = self.rig.gravity, gravity
+        if self.settings.level == 'imu' and (
+            former is None or _angle_rad(former, gravity) > _GRAVITY_RAD
+        ):
+            self._builder.renew(forget=False)
+
     def calibrate(self, method: str, save: bool) -> Future:
         """Measure the overlaps anew, off the frame path; as of `CompositorBuilder.calibrate`."""
         self._asked = self._builder.calibrate(self.settings, method, save)
@@ -223,6 +245,16 @@ class StitchPipeline:
     def overlaps(self) -> list[Overlap]:
         """What is in use between neighbours; [] before the first panorama."""
         return self.rig.effective_overlaps(self.settings) if self.compositor else []
+
+    @property
+    def rig_faults(self) -> list[str]:
+        """What is wrong with the rig as it is drawn, in sentences."""
+        overlaps = self.overlaps
+        if not overlaps or (not overlaps[0].attitude and all(one.found for one in overlaps)):
+            return []
+        solution = self.rig.solution(overlaps, self.settings)
+        apart = ['no overlap: frames are side by side'] if solution.rig.apart else []
+        return [*apart, *(words for words in solution.messages if 'is closed; it' not in words)]
 
     @property
     def trouble(self) -> str:
@@ -299,3 +331,7 @@ class StitchPipeline:
         encoding = 'mono8' if images[0].ndim == 2 else self._color
         is_economical = self.economy.started()
         return Panorama(compositor, images, frames.stamp_ns, encoding, stale, is_economical)
+
+
+def _angle_rad(first: np.ndarray, second: np.ndarray) -> float:
+    return float(np.arctan2(np.linalg.norm(np.cross(first, second)), first @ second))

@@ -1,7 +1,7 @@
-"""The overlap of two neighbouring cameras, measured once on what they see.
+"""The overlap of two corrected images: by the full search over offsets, or by the published rule.
 
-Particles, or the full search, propose offsets; each is verified by correlating the structure of
-the overlap tile by tile, and the winner is refined to a fraction of a pixel.
+The full search proposes offsets; each is verified by correlating the structure of the overlap tile
+by tile, and the winner is refined to a fraction of a pixel.
 """
 
 from collections.abc import Sequence
@@ -12,11 +12,11 @@ import cv2
 import numpy as np
 
 from fisheye_core.errors import OverlapError
+from fisheye_geometry.attitude import LEVEL
 from fisheye_geometry.surface import Surface
 from panorama_stitch.overlap import paper, wording
-from panorama_stitch.overlap.overlap_result import Overlap, side_by_side
-from panorama_stitch.overlap.overlap_settings import METHODS, OverlapSettings
-from panorama_stitch.overlap.particles import Particle
+from panorama_stitch.overlap.overlap_result import Overlap, attitude_at, side_by_side
+from panorama_stitch.overlap.overlap_settings import OverlapSettings
 from panorama_stitch.overlap.registration import Registration, Search, fit_at, register
 
 _SMALLEST_PX = 32
@@ -25,14 +25,14 @@ _FOCAL_TOLERANCE = 1e-3
 """Relative difference of the focal lengths that moves a whole picture by less than a pixel."""
 
 
-def measure_overlap(
+def measure_corrected(
     pairs: Sequence[tuple[np.ndarray, np.ndarray]],
     surface_left: Surface,
     surface_right: Surface,
     settings: OverlapSettings,
-    method: str | None = None,
+    method: str,
 ) -> Overlap:
-    """Measure the overlap of two neighbouring cameras.
+    """Measure the overlap of two neighbouring cameras on their corrected images.
 
     Parameters
     ----------
@@ -45,15 +45,14 @@ def measure_overlap(
     settings
         How to measure.
     method
-        One of `METHODS`; None: as the settings say.
+        'correlation' or 'paper'.
 
     Raises
     ------
     OverlapError
         If a picture is missing or fits its surface not, or the surfaces do not fit together.
     """
-    method = method or settings.method
-    _check(pairs, surface_left, surface_right, method)
+    _check(pairs, surface_left, surface_right)
     overlaps = [
         _Measurement(left, right, surface_left, surface_right, settings).run(method)
         for left, right in pairs
@@ -64,9 +63,7 @@ def measure_overlap(
     return found[len(found) // 2]
 
 
-def _check(pairs, surface_left, surface_right, method) -> None:
-    if method not in METHODS:
-        raise OverlapError(f"method '{method}' is not known; expected one of {', '.join(METHODS)}")
+def _check(pairs, surface_left, surface_right) -> None:
     if not pairs:
         raise OverlapError('no pair of pictures was given; expected at least one')
     if surface_left.kind != surface_right.kind:
@@ -104,7 +101,7 @@ class _Measurement:
     """One pair of pictures, measured."""
 
     def __init__(self, left, right, surface_left, surface_right, settings):
-        self._left, self._right = _grey(left), _grey(right)
+        self._left, self._right = grey_of(left), grey_of(right)
         self._surfaces = surface_left, surface_right
         self._settings = settings
         self._half_start = surface_left.width - surface_left.width // 2
@@ -122,10 +119,7 @@ class _Measurement:
             tilt=self._settings.correct_tilt and self._surfaces[1].yaw_is_column_shift,
             min_confidence=self._settings.min_confidence,
         )
-        by_particles = method == 'particles'
-        found = register(
-            self._left, self._right, *self._surfaces, search, by_particles=by_particles
-        )
+        found = register(self._left, self._right, *self._surfaces, search)
         if found.confidence < self._settings.min_confidence:
             return self._not_found(method, found)
         return self._found(found)
@@ -150,6 +144,7 @@ class _Measurement:
             found=True,
             offset_x_px=x,
             offset_y_px=0.0,
+            attitude=attitude_at(x, 0.0, *self._surfaces, LEVEL),
             overlap_px=max(0.0, width - x),
             confidence=fit_at(self._left, self._right, *self._surfaces, x),
             min_correlation_value=match.min_correlation_value,
@@ -179,30 +174,12 @@ class _Measurement:
             found=True,
             offset_x_px=x,
             offset_y_px=y,
-            turn=found.pose.turn,
+            attitude=attitude_at(x, y, *self._surfaces, found.pose.turn),
             overlap_px=max(0.0, min(self._surfaces[0].width - x, self._surfaces[1].width)),
             confidence=found.confidence,
         )
         rival_x_px = found.rival_x_px + self._half_start if found.distinct < 1 else nan
-        words = wording.description(overlap, *self._surfaces, rival_x_px)
-        overlap = replace(overlap, message=words)
-        if found.proposals is None:
-            return overlap
-        n, m = found.match
-        left, right = (
-            tuple(Particle(*row) for row in properties.tolist())
-            for properties in (found.proposals.left, found.proposals.right)
-        )
-        matched = paper.mean_differences(left[n : n + 1], right[m : m + 1]) if n >= 0 else [[nan]]
-        return replace(
-            overlap,
-            method='particles',
-            left_particles=left,
-            right_particles=right,
-            left_match=n,
-            right_match=m,
-            min_correlation_value=float(matched[0][0]),
-        )
+        return replace(overlap, message=wording.description(overlap, *self._surfaces, rival_x_px))
 
     def _not_found(self, method, found) -> Overlap:
         needed = self._settings.min_confidence
@@ -214,8 +191,8 @@ class _Measurement:
         return replace(aside, confidence=found.confidence)
 
 
-def _grey(picture: np.ndarray) -> np.ndarray:
-    """Give a grey picture (height, width), still 0 exactly where nothing is seen."""
+def grey_of(picture: np.ndarray) -> np.ndarray:
+    """Return a grey image (height, width), still 0 exactly where nothing is seen."""
     if picture.ndim == 2:
         return picture
     if picture.shape[2] == 1:

@@ -1,0 +1,175 @@
+"""The methods by which the overlap of two neighbours is measured, by name.
+
+Each takes what is known of a pair and gives an `Overlap`. To add one, write such a function and
+a line in `METHODS`.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from math import acos, isnan, pi, radians, sqrt
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from fisheye_geometry.attitude import Attitude
+from fisheye_geometry.lens import Lens
+from fisheye_geometry.remap import remap_table
+from fisheye_geometry.surface import Surface
+from panorama_stitch.overlap import wording
+from panorama_stitch.overlap.corrected_overlap import grey_of, measure_corrected
+from panorama_stitch.overlap.measure import measure_rotation
+from panorama_stitch.overlap.overlap_result import Overlap, side_by_side
+from panorama_stitch.overlap.overlap_settings import OverlapSettings
+from panorama_stitch.overlap.reported_particles import with_particles
+from panorama_stitch.overlap.view import View
+
+_UNKNOWN_TILT_RAD = radians(50.0)
+"""Two cameras that each look up or down by 25 degrees differ by so much."""
+_LEAST_TILT_RAD, _SURELY = radians(0.1), 2.0
+"""Less tilt, or less than so many deviations, is noise: the mount is level."""
+
+
+@dataclass(frozen=True, eq=False)
+class CameraView:
+    """What a camera's images show.
+
+    Attributes
+    ----------
+    source
+        A lens's view, or a surface where they are corrected already.
+    surface
+        The corrected image of the camera alone; all of a rig have one kind and focal length.
+    body
+        (source height, source width) bool: where they show the robot itself; None for nowhere.
+    """
+
+    source: Lens | Surface
+    surface: Surface
+    body: np.ndarray | None = None
+
+    def corrected(self, image: np.ndarray) -> np.ndarray:
+        """Correct a whole image to grey, (height, width) uint8; 0 exactly where nothing is seen."""
+        grey = grey_of(image)
+        if self.source == self.surface:
+            return grey
+        table = remap_table(self.source, self.surface)
+        return np.maximum(table(grey), table.valid.astype(np.uint8))
+
+
+@dataclass(frozen=True, eq=False)
+class PairInput:
+    """Two neighbours and what was seen of them.
+
+    Attributes
+    ----------
+    left, right
+        What their images show.
+    images
+        One or more pairs (left, right) of images (height, width[, channels]) uint8.
+    expected
+        The right camera's attitude in the left one's frame where mounts say it; None: not known.
+    within_rad
+        How far from it the attitude may be.
+    """
+
+    left: CameraView
+    right: CameraView
+    images: Sequence[tuple[np.ndarray, np.ndarray]]
+    expected: Attitude | None = None
+    within_rad: float = pi
+
+    @property
+    def surfaces(self) -> tuple[Surface, Surface]:
+        """On what both corrected images are."""
+        return self.left.surface, self.right.surface
+
+    def corrected(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Return the pairs of images, corrected."""
+        return [
+            (self.left.corrected(left), self.right.corrected(right)) for left, right in self.images
+        ]
+
+
+Method = Callable[[PairInput, OverlapSettings], Overlap]
+
+
+def by_votes(pair: PairInput, settings: OverlapSettings) -> Overlap:
+    """Measure the rotation between both cameras on many local votes; particles are reported.
+
+    On a plane, where a rotation is no shift, the corrected images are correlated.
+    """
+    if not pair.left.surface.yaw_is_column_shift:
+        return by_correlation(pair, settings)
+    views = [
+        tuple(
+            View(image, camera.source, camera.body)
+            for image, camera in zip(images, (pair.left, pair.right), strict=True)
+        )
+        for images in pair.images
+    ]
+    expected, within_rad = _search(pair, settings)
+    result = measure_rotation(
+        views, expected=expected, within_rad=within_rad, min_confidence=settings.min_confidence
+    )
+    attitude = Attitude.of(result.rotation.as_matrix()) if result.found else None
+    if attitude and _is_wanted(attitude, pair, settings):
+        attitude = _supported(attitude, result, settings)
+        overlap = Overlap('particles', True, attitude=attitude, near_deg=result.near_deg)
+        overlap = replace(overlap, message=f'{wording.direction(attitude)}, {result.message}')
+    else:
+        overlap = side_by_side(
+            pair.left.surface, 'particles', f'no common scene: {result.message}'
+        )
+    overlap = replace(overlap, confidence=result.confidence)
+    images = pair.images[-1]
+    corrected = pair.left.corrected(images[0]), pair.right.corrected(images[1])
+    return with_particles(overlap, corrected, pair.surfaces, settings)
+
+
+def _search(pair: PairInput, settings: OverlapSettings) -> tuple[Rotation | None, float]:
+    """Return where the search begins and how far it goes, rad."""
+    if pair.expected is not None:
+        within_rad = pair.within_rad
+        return Rotation.from_matrix(pair.expected.matrix), within_rad
+    if isnan(settings.expected_yaw_deg):
+        return None, pi
+    yaw = Attitude(yaw_rad=radians(settings.expected_yaw_deg))
+    tolerance_rad = radians(settings.yaw_tolerance_deg)
+    return Rotation.from_matrix(yaw.matrix), min(pi, tolerance_rad + _UNKNOWN_TILT_RAD)
+
+
+def _is_wanted(attitude: Attitude, pair: PairInput, settings: OverlapSettings) -> bool:
+    """Whether an attitude is one that the settings allow."""
+    if pair.expected is not None or isnan(settings.expected_yaw_deg):
+        return True
+    # Mounts that look up or down make the axes' angle smaller than the yaw about the vertical.
+    between_rad = acos(max(-1.0, min(1.0, float(attitude.matrix[2, 2]))))
+    apart_rad = abs(between_rad - radians(settings.expected_yaw_deg))
+    return apart_rad <= radians(settings.yaw_tolerance_deg) + _UNKNOWN_TILT_RAD / 2
+
+
+def _supported(attitude: Attitude, result, settings: OverlapSettings) -> Attitude:
+    """Return an attitude with no more pitch and roll than the votes support."""
+    deviation_rad = sqrt(float(np.linalg.eigvalsh(result.covariance)[-1]))
+    least_rad = max(_LEAST_TILT_RAD, _SURELY * deviation_rad)
+    tilt_rad = max(abs(attitude.pitch_rad), abs(attitude.roll_rad))
+    if not settings.correct_tilt or tilt_rad < least_rad:
+        return Attitude(yaw_rad=attitude.yaw_rad)
+    return attitude
+
+
+def by_correlation(pair: PairInput, settings: OverlapSettings) -> Overlap:
+    """Correlate the corrected images at every offset."""
+    return measure_corrected(pair.corrected(), *pair.surfaces, settings, 'correlation')
+
+
+def by_paper(pair: PairInput, settings: OverlapSettings) -> Overlap:
+    """Apply the published rule to the corrected images."""
+    return measure_corrected(pair.corrected(), *pair.surfaces, settings, 'paper')
+
+
+METHODS: dict[str, Method] = {
+    'particles': by_votes,
+    'correlation': by_correlation,
+    'paper': by_paper,
+}
