@@ -213,9 +213,9 @@ def test_a_turned_camera_is_levelled():
         Scene().view(LENS, attitude).frame(STAMP_NS),
     ]
     level = [View(LENS, SURFACE)] * 2
-    tilted = Overlap('true', True, OFFSET, 0.0, turn)
+    tilted = Overlap('true', True, OFFSET, 0.0, attitude)
     quality = []
-    for overlap in (replace(tilted, turn=LEVEL), tilted):
+    for overlap in (replace(tilted, attitude=LEVEL), tilted):
         placed = place(views_at_overlaps(level, [overlap]))
         layout, _, out = drawn(lay_out(placed, fade_px=10.0, crop='valid'), placed, images)
         truth = Scene().view(layout.surface).frame(STAMP_NS)

@@ -24,7 +24,7 @@ FIRST = Overlap(
     True,
     545.02,
     -1.25,
-    Turn(0.0, radians(1.0), radians(0.8)),
+    Turn(radians(140.0), radians(1.0), radians(0.8)),
     116.98,
     0.8125,
     message='found',
@@ -47,8 +47,8 @@ def edit(path, change):
 
 def test_what_was_written_is_read_again(path):
     first, second = read_overlaps(path, CAMERAS, SURFACES)
-    assert first.turn.pitch_rad == pytest.approx(FIRST.turn.pitch_rad)
-    assert replace(first, turn=FIRST.turn, min_correlation_value=0.0) == replace(
+    assert first.attitude.pitch_rad == pytest.approx(FIRST.attitude.pitch_rad)
+    assert replace(first, attitude=FIRST.attitude, min_correlation_value=0.0) == replace(
         FIRST, min_correlation_value=0.0
     )
     assert second == replace(SECOND, min_correlation_value=second.min_correlation_value)
@@ -98,7 +98,7 @@ def test_another_rig_is_refused(path, cameras, changes, sentence):
 @pytest.mark.parametrize(
     ('change', 'sentence'),
     [
-        (lambda e: e.update(version=2), 'version is 2; expected 1'),
+        (lambda e: e.update(version=3), 'version is 3; expected 1 or 2'),
         (lambda e: e.pop('version'), 'version is None; expected 1'),
         (lambda e: e.update(cameras='left'), "cameras is 'left'; expected a list"),
         (lambda e: e.pop('overlaps'), 'overlaps is None; expected a list'),
@@ -132,8 +132,11 @@ def test_nothing_but_the_file_is_left_behind(path):
 
 def test_what_no_rig_can_have_is_refused(path):
     good = path.read_text()
-    for key, value in (('offset_x_px', 1e9), ('offset_y_px', -5000), ('roll_deg', 90)):
-        path.write_text(re.sub(f'{key}: [^,}}]*', f'{key}: {value}', good, count=1))
+    wrong = [('yaw_deg', 400), ('roll_deg', 190)]
+    first = [('offset_x_px', 1e9), ('offset_y_px', -5000), ('roll_deg', 90)]
+    for version, key, value in [(2, *each) for each in wrong] + [(1, *each) for each in first]:
+        edited = good.replace('version: 2', f'version: {version}')
+        path.write_text(re.sub(f'{key}: [^,}}]*', f'{key}: {value}', edited, count=1))
         with pytest.raises(OverlapFileError, match=f'{key} of .*; expected a finite number up to'):
             read_overlaps(path, CAMERAS, SURFACES)
 

@@ -13,8 +13,9 @@ THREE = ('left', 'front/middle', 'right')
 @pytest.mark.parametrize(
     ('values', 'sentence'),
     [
-        ({'cameras': ('left',)}, 'expected at least two different names'),
-        ({'cameras': ('left', 'left')}, 'expected at least two different names'),
+        ({'cameras': ()}, 'expected 1 to 8 different names'),
+        ({'cameras': tuple('abcdefghi')}, 'expected 1 to 8 different names'),
+        ({'cameras': ('left', 'left')}, 'expected 1 to 8 different names'),
         ({'cameras': ('left cam', 'right')}, "cameras has 'left cam'; expected a letter"),
         ({'cameras': ('left', '')}, "cameras has ''"),
         ({'offset_x_px': (500.0, 2.0)}, 'offset_x_px has 2 numbers; expected 1'),

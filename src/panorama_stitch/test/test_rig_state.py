@@ -108,7 +108,7 @@ def test_three_cameras():
     stitcher = stitcher_of((LENS,) * 3, ('left', 'middle', 'right'))
     stitcher.overlaps = stitcher.measure([pictures], SETTINGS, 'correlation')
     expected = pytest.approx(np.radians(120) * LENS.focal_x_px, abs=CLOSE_PX)
-    assert [overlap.offset_x_px for overlap in stitcher.overlaps] == [expected, expected]
+    assert [overlap.offset_x_px for overlap in stitcher.overlaps] == [expected] * 3
     compositor = stitcher.compositor(SETTINGS, pictures)
     out = np.empty(
         (compositor.layout.surface.height, compositor.layout.surface.width, 3), np.uint8
@@ -134,8 +134,8 @@ def over_jpeg(picture, quality):
 def test_jpeg_makes_no_tilt(pictures, quality):
     received = [over_jpeg(picture, quality) for picture in pictures]
     (overlap,) = stitcher_of().measure([received], SETTINGS, 'particles')
-    assert abs(overlap.turn.pitch_rad) < np.radians(0.05)
-    assert abs(overlap.turn.roll_rad) < np.radians(0.05)
+    assert abs(overlap.attitude.pitch_rad) < np.radians(0.05)
+    assert abs(overlap.attitude.roll_rad) < np.radians(0.05)
     assert abs(overlap.offset_y_px) < 0.1
 
 
@@ -143,5 +143,5 @@ def test_a_small_tilt_is_measured():
     turns = Turn(yaw_rad=-YAW / 2), Turn(YAW / 2, np.radians(0.3), np.radians(0.2))
     tilted = [Scene().view(LENS, turn).frame(0) for turn in turns]
     (overlap,) = stitcher_of().measure([tilted], SETTINGS, 'particles')
-    assert np.degrees(overlap.turn.pitch_rad) == pytest.approx(0.3, abs=0.1)
-    assert np.degrees(overlap.turn.roll_rad) == pytest.approx(0.2, abs=0.1)
+    assert np.degrees(overlap.attitude.pitch_rad) == pytest.approx(0.3, abs=0.1)
+    assert np.degrees(overlap.attitude.roll_rad) == pytest.approx(0.2, abs=0.1)

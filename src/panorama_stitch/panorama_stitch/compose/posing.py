@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from fisheye_geometry.attitude import Attitude
+from fisheye_geometry.attitude import LEVEL
 from fisheye_geometry.rig import Rig
 from fisheye_geometry.surface import Surface
 from panorama_stitch.compose.view import View
@@ -76,7 +76,7 @@ def views_at_overlaps(views: Sequence[View], overlaps: Sequence[Overlap]) -> lis
         shifts.append(np.array([x_px, y_px]))
     # Straight ahead is midway between the outer cameras.
     middle = np.array([shifts[-1][0] / 2, 0.0])
-    turns = [Attitude(), *(overlap.turn for overlap in overlaps)]
+    turns = [LEVEL, *(overlap.attitude or LEVEL for overlap in overlaps)]
     return [
         replace(
             view,

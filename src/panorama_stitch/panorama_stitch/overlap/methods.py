@@ -48,7 +48,7 @@ class CameraView:
     body: np.ndarray | None = None
 
     def corrected(self, image: np.ndarray) -> np.ndarray:
-        """Correct a whole image to grey, (height, width) uint8; 0 exactly where nothing is seen."""
+        """Correct an image to grey, (height, width) uint8; 0 exactly where nothing is seen."""
         grey = grey_of(image)
         if self.source == self.surface:
             return grey
@@ -107,6 +107,9 @@ def by_votes(pair: PairInput, settings: OverlapSettings) -> Overlap:
         )
         for images in pair.images
     ]
+    if all(np.array_equal(left, right) for left, right in pair.images):
+        message = 'both views are the same picture; is one camera used twice, or both covered?'
+        return side_by_side(pair.left.surface, 'particles', message)
     expected, within_rad = _search(pair, settings)
     result = measure_rotation(
         views, expected=expected, within_rad=within_rad, min_confidence=settings.min_confidence
@@ -123,7 +126,7 @@ def by_votes(pair: PairInput, settings: OverlapSettings) -> Overlap:
     overlap = replace(overlap, confidence=result.confidence)
     images = pair.images[-1]
     corrected = pair.left.corrected(images[0]), pair.right.corrected(images[1])
-    return with_particles(overlap, corrected, pair.surfaces, settings)
+    return with_particles(overlap, corrected, pair.surfaces)
 
 
 def _search(pair: PairInput, settings: OverlapSettings) -> tuple[Rotation | None, float]:
@@ -144,8 +147,8 @@ def _is_wanted(attitude: Attitude, pair: PairInput, settings: OverlapSettings) -
         return True
     # Mounts that look up or down make the axes' angle smaller than the yaw about the vertical.
     between_rad = acos(max(-1.0, min(1.0, float(attitude.matrix[2, 2]))))
-    apart_rad = abs(between_rad - radians(settings.expected_yaw_deg))
-    return apart_rad <= radians(settings.yaw_tolerance_deg) + _UNKNOWN_TILT_RAD / 2
+    yaw_between_rad = abs(between_rad - radians(settings.expected_yaw_deg))
+    return yaw_between_rad <= radians(settings.yaw_tolerance_deg) + _UNKNOWN_TILT_RAD / 2
 
 
 def _supported(attitude: Attitude, result, settings: OverlapSettings) -> Attitude:

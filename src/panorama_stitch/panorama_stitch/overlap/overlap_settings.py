@@ -15,8 +15,8 @@ class OverlapSettings:
 
     method: str = setting(
         'particles',
-        'How the overlap is found: particles measures the rotation on many local votes, correlation '
-        'searches all offsets of the corrected images, paper is the published rule as it is.',
+        'How the overlap is found: particles measures the rotation on many local votes, '
+        'correlation searches all offsets, paper is the published rule as it is.',
         choices=METHODS,
         live=True,
     )

@@ -319,7 +319,8 @@ class RigState:
         pair = pairs_of(count, is_closed=True)[-1]
         if not all(overlap.found and overlap.attitude for overlap in overlaps):
             return (pair, {}) if settings.ring == 'closed' else None
-        rig = self._solve(overlaps, settings, level='symmetric').rig
+        closed = replace(settings, ring='closed')
+        rig = self._solve(overlaps, closed, level='symmetric').rig
         if not leads_around(views_of_rig(rig, surfaces)):
             return (pair, {}) if settings.ring == 'closed' else None
         return pair, {'expected': rig.relative(pair), 'within_rad': _CLOSING_RAD}
