@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from messages import camera_infos, compressed_images, images, projections
-from panorama_stitch.overlap.measure_overlap import Overlap
+from panorama_stitch.overlap.overlap_result import Overlap
 
 from fisheye_bridge.camera_info import camera_of
 from fisheye_bridge.images import from_jpeg, to_array

@@ -66,7 +66,7 @@ def measure_rotation(
     proposals = propose_rotations(matches, _PROPOSALS, near=near, within_rad=within_rad)
     if near is not None:
         proposals.append(Proposal(near, 0.0))
-    best = _best(pairs[:1], usable[:1], proposals)
+    best = _best([pairs[i] for i in few], [usable[i] for i in few], proposals)
     if best is None:
         return RotationResult(None)
     chosen, stages, wide = best
