@@ -72,6 +72,15 @@ def rotation_matrix(vector: np.ndarray) -> np.ndarray:
     return cv2.Rodrigues(np.asarray(vector, float))[0]
 
 
+def quaternion(attitude: Attitude) -> tuple[float, float, float, float]:
+    """Return the rotation of an attitude as the unit quaternion (x, y, z, w), w not negative."""
+    vector = rotation_vector(attitude.matrix)
+    angle_rad = float(np.linalg.norm(vector))
+    scale = sin(angle_rad / 2) / angle_rad if angle_rad else 0.5
+    x, y, z = (float(value) for value in scale * vector)
+    return x, y, z, cos(angle_rad / 2)
+
+
 def angle_between(first: np.ndarray, second: np.ndarray) -> float:
     """Return the angle of the rotation that takes one attitude (3, 3) to another, rad."""
     return float(np.linalg.norm(rotation_vector(np.asarray(first).T @ np.asarray(second))))
