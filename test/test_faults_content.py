@@ -9,7 +9,6 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from messages import camera_infos, compressed_images, images, projections
-from panorama_stitch.overlap.overlap_result import Overlap
 
 from fisheye_bridge.camera_info import camera_of
 from fisheye_bridge.images import from_jpeg, to_array
@@ -20,6 +19,7 @@ from fisheye_core.errors import FileAccessError, FileContentError, FisheyeError
 from fisheye_geometry.camera_file import Camera, read_camera, write_camera
 from fisheye_undistort.undistort_settings import UndistortSettings
 from panorama_stitch.overlap.overlap_file import read_overlaps, write_overlaps
+from panorama_stitch.overlap.overlap_result import Overlap
 
 EXAMPLES = 3000 if os.environ.get('LONG') else 300
 LENS = synthetic_lens(640, 480, 2.97)

@@ -1,10 +1,13 @@
 """Two lenses in one stream: the cameras share its reader, and each is a region of its frames."""
 
-from math import radians
+import os
+from math import pi, radians
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from ament_index_python.packages import get_package_share_directory
 from field import write_pictures
 
 from fisheye_testing.health import Health
@@ -16,6 +19,25 @@ CLOSE_PX = 1.5
 """Of an overlap; JPEG moves it a little."""
 JPEG_LEVELS = 6.0
 """Mean difference that coding a picture once more may make."""
+
+NOMINAL_DEG = 1.5
+"""So well the rotations there and back fit with a lens that nobody calibrated."""
+
+
+@pytest.fixture
+def real_data():
+    """Return the path of a file of real pictures."""
+
+    def path(name):
+        found = Path(os.environ.get('FISHEYE_DATA', ''), name)
+        if not found.is_file():
+            message = f'{found} is not there: real pictures are looked for in $FISHEYE_DATA'
+            if os.environ.get('REQUIRE_DATA') == '1':
+                pytest.fail(message)
+            pytest.skip(message)
+        return found
+
+    return path
 
 
 @pytest.fixture
@@ -120,6 +142,44 @@ def test_lenses_of_a_topic_that_camera_infos_describe(rig, watcher, tmp_path, bo
         command += ['-p', f'{side}.source:=topic', '-p', f'{side}.region:={side}']
     rig.run('panorama', command)
     check_panorama(rig, watcher)
+
+
+def test_a_dual_fisheye_frame_becomes_a_closed_panorama(rig, watcher, real_data):
+    frame = real_data('gear360/frame.png')
+    nominal = Path(get_package_share_directory('panorama_stitch'), 'config/calibration')
+    rig.start(
+        'panorama',
+        surface='equirectangular',
+        **{
+            f'{side}.{name}': value
+            for side in SIDES
+            for name, value in (
+                ('source', frame),
+                ('region', side),
+                (
+                    'camera_info_url',
+                    'package://panorama_stitch/config/calibration/dual_fisheye.yaml',
+                ),
+                ('mask_file', nominal / 'dual_fisheye_mask.png'),
+            )
+        },
+    )
+    wait_for(
+        lambda: rig.check_alive() or (watcher.projection and watcher.projection.wraps),
+        START_S,
+        'a closed panorama',
+    )
+    there, back = watcher.overlaps.overlaps
+    assert there.found
+    assert back.found
+    assert there.yaw_deg + back.yaw_deg == pytest.approx(360, abs=0.1)
+    assert (there.pitch_deg, there.roll_deg) == pytest.approx(
+        (back.pitch_deg, back.roll_deg), abs=NOMINAL_DEG
+    )
+    projection = watcher.projection
+    assert projection.width == pytest.approx(2 * pi * projection.focal_px)
+    wait_for(lambda: watcher.newest, START_S, 'it')
+    assert watcher.picture().shape[1] == projection.width
 
 
 def test_a_region_outside_the_frame_stops_only_its_own_camera(rig, watcher, tmp_path, both):

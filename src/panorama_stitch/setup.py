@@ -20,7 +20,7 @@ setup(
         (f'share/{package_name}/rviz', glob('rviz/*.rviz')),
         (f'share/{package_name}/foxglove', glob('foxglove/*.json')),
         (f'share/{package_name}/config', ['config/panorama.yaml']),
-        (f'share/{package_name}/config/calibration', glob('config/calibration/*.yaml')),
+        (f'share/{package_name}/config/calibration', glob('config/calibration/*')),
     ],
     extras_require={'test': ['hypothesis', 'pytest']},
     entry_points={

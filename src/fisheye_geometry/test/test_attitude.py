@@ -7,6 +7,7 @@ from fisheye_geometry.attitude import (
     LEVEL,
     Attitude,
     angle_between,
+    quaternion,
     rotation_matrix,
     rotation_vector,
 )
@@ -49,3 +50,15 @@ def test_only_a_turn_about_the_vertical_is_a_pure_yaw():
     assert Attitude(1.0).is_pure_yaw
     assert not Attitude(1.0, 0.1).is_pure_yaw
     assert not Attitude(1.0, 0.0, 0.1).is_pure_yaw
+
+
+@pytest.mark.parametrize(
+    'attitude', [*ATTITUDES, LEVEL, Attitude(np.pi), Attitude(roll_rad=np.pi)]
+)
+def test_a_quaternion_is_the_same_rotation(attitude):
+    x, y, z, w = quaternion(attitude)
+    vector = np.array([x, y, z])
+    across = np.cross(vector, np.eye(3)).T
+    matrix = np.eye(3) + 2 * w * across + 2 * across @ across
+    assert w >= 0
+    assert matrix == pytest.approx(attitude.matrix, abs=1e-7)

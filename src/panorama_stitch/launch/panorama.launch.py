@@ -18,9 +18,8 @@ from ament_index_python.packages import (
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironmentVariable
 from launch_ros.actions import Node, SetParameter
 
-from fisheye_core.errors import FileAccessError, FileContentError
-from fisheye_core.yaml_file import read_mapping
-from fisheye_geometry.surface_kind import KINDS
+from fisheye_core.errors import FisheyeError
+from fisheye_geometry.attitude import Attitude, quaternion
 from launch import LaunchDescription, logging
 from panorama_stitch.overlap.saved_rig import saved_rig
 
@@ -198,9 +197,7 @@ def of_stitch(arguments):
 def separate(arguments):
     """Return the nodes that make the panorama of what the captures publish."""
     corrections = [
-        node(
-            arguments, 'fisheye_undistort', 'undistort', camera, transport=arguments['transport']
-        )
+        node(arguments, 'fisheye_undistort', 'undistort', camera, transport=arguments['transport'])
         for camera in arguments['cameras']
     ]
     return [*corrections, node(arguments, 'panorama_stitch', 'stitch', **of_stitch(arguments))]

@@ -2,27 +2,55 @@
 
 import importlib.util
 import sys
+from math import degrees, radians
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
+import numpy as np
 import pytest
 import yaml
 from ament_index_python.packages import PackageNotFoundError
 
+from fisheye_geometry.attitude import Attitude, quaternion
 from fisheye_geometry.surface_kind import KINDS
 
 FILE = Path(__file__).parents[1] / 'launch' / 'panorama.launch.py'
 CAPTURES = {'left/capture', 'right/capture'}
 REST = {'left/undistort', 'right/undistort', 'stitch'}
 TOPICS = {'left.source': 'topic', 'right.source': 'topic'}
+SIZE = {'width': 600, 'height': 300, 'focal_px': 200.0, 'center_y_px': 150.0}
+SURFACE = {'surface': 'cylindrical', **SIZE}
+MEASURED = {'method': 'particles', 'found': True, 'overlap_px': 200.0, 'confidence': 0.9}
+LEVEL = {'offset_x_px': 390.0, 'offset_y_px': 0.0, 'pitch_deg': 0.0, 'roll_deg': 0.0}
 OVERLAP = {
+    'version': 1,
     'cameras': [
-        {'surface': 'cylindrical', 'focal_px': 200.0, 'center_x_px': 300.0},
-        {'surface': 'cylindrical', 'focal_px': 200.0, 'center_x_px': 310.0},
+        {'name': 'left', **SURFACE, 'center_x_px': 300.0},
+        {'name': 'right', **SURFACE, 'center_x_px': 310.0},
     ],
-    'overlaps': [{'found': True, 'offset_x_px': 390.0}],
+    'overlaps': [{'left': 'left', 'right': 'right', **MEASURED, **LEVEL}],
 }
 """Its angle is 2 rad."""
+RING = ('front', 'right', 'rear', 'left')
+
+
+def ring(cameras=RING, **changes):
+    """Return the overlap file of a ring whose cameras look down by 10 degrees each."""
+    step = Attitude(0.0, radians(-10)).matrix.T @ Attitude(radians(90), radians(-10)).matrix
+    angles = Attitude.of(step)
+    entry = {
+        **MEASURED, **LEVEL, 'near_deg': 0.0, 'offset_x_px': 300.0,
+        'yaw_deg': degrees(angles.yaw_rad),
+        'pitch_deg': degrees(angles.pitch_rad),
+        'roll_deg': degrees(angles.roll_rad),
+    }  # fmt: skip
+    pairs = zip(cameras, (*cameras[1:], cameras[0]), strict=True)
+    return {
+        'version': 2,
+        'cameras': [{'name': name, **SURFACE, 'center_x_px': 300.0} for name in cameras],
+        'overlaps': [{'left': left, 'right': right, **entry} for left, right in pairs],
+        **changes,
+    }
 
 
 def loaded():
@@ -142,7 +170,20 @@ def test_files_in_the_home(rig, tmp_path, monkeypatch):
         ({'composed': 'maybe'}, "composed is 'maybe'; expected true or false"),
         ({'use_sim_time': '2'}, "use_sim_time is '2'; expected true or false"),
         ({'frame_rate_hz': 'fast'}, "frame_rate_hz is 'fast'; expected a number"),
-        ({'vfov_deg': '60'}, "no argument 'vfov_deg'; expected composed, robot, "),
+        ({'vfov_deg': '60'}, "no argument 'vfov_deg'; expected cameras, composed, "),
+        ({'cameras': 'front,front'}, 'cameras is front,front; expected 1 to 8 different names'),
+        ({'cameras': 'a,b,c,d,e,f,g,h,i'}, 'cameras is a,b,c,d,e,f,g,h,i; expected 1 to 8'),
+        ({'cameras': 'front,2nd'}, "cameras has '2nd'; expected names of a letter, then"),
+        ({'cameras': ''}, "cameras has ''; expected names of a letter, then"),
+        ({'front_source': '0'}, "no argument 'front_source'; expected cameras, .*, left_source"),
+        (
+            {'cameras': 'a,b', 'left_source': '0'},
+            "no argument 'left_source'; expected .*, a_source",
+        ),
+        (
+            {'cameras': 'a,b,c', 'transforms': 'true', 'yaw_deg': '90'},
+            'yaw_deg is the angle between two cameras; there are 3',
+        ),
         ({'transforms': 'true'}, 'needs yaw_deg or overlap_file'),
         ({'transforms': 'true', 'yaw_deg': 'abc'}, "yaw_deg is 'abc'; expected a number"),
         ({'transforms': 'true', 'yaw_deg': 'nan'}, "yaw_deg is 'nan'; expected a number"),
@@ -189,7 +230,62 @@ def test_transforms_of_a_given_and_of_a_measured_angle(rig, overlap_file):
     assert set(measured) == set(given) == CAPTURES | REST | transforms
     for name in transforms:
         assert measured[name].arguments == given[name].arguments
-    assert given['left_transform'].arguments[-3] == '-0.479425539'
+    assert turn_of(given['left_transform'])[1] == pytest.approx(-0.479425539)
+
+
+def turn_of(node):
+    """Return the quaternion that a transform publishes."""
+    words = node.arguments
+    return [float(words[words.index(f'--q{axis}') + 1]) for axis in 'xyzw']
+
+
+def test_transforms_of_a_closed_ring_are_level(rig, overlap_file):
+    overlap_file.write_text(yaml.safe_dump(ring()))
+    nodes, _ = rig.start(transforms='true', cameras=','.join(RING), overlap_file=str(overlap_file))
+    turns = {name: turn_of(nodes[f'{name}_transform']) for name in RING}
+    for name, yaw_deg in zip(RING, (-135, -45, 45, 135), strict=True):
+        expected = quaternion(Attitude(radians(yaw_deg), radians(-10)))
+        assert np.abs(turns[name]) == pytest.approx(np.abs(expected), abs=1e-6)
+    assert nodes['front_transform'].arguments[3] == 'front_optical_frame'
+
+
+@pytest.mark.parametrize('composed', ['true', 'false'])
+def test_any_cameras(rig, composed):
+    nodes, _ = rig.start(
+        cameras='front, right,rear/high', composed=composed, robot='true', base='true',
+        front_source='0', right_source='2', right_camera_info_url='/r.yaml',
+        **{'rear/high_region': 'left'},
+    )  # fmt: skip
+    names = ('front', 'right', 'rear/high')
+    nodes_of_all = {'panorama'} if composed == 'true' else {f'{n}/undistort' for n in names}
+    assert nodes_of_all | {f'{name}/capture' for name in names} <= set(nodes)
+    assert rig.given(nodes['front/capture']) == {'source': '0'}
+    assert rig.given(nodes['right/capture']) == {'source': '2', 'camera_info_url': '/r.yaml'}
+    assert rig.given(nodes['rear/high/capture']) == {'region': 'left'}
+    last = rig.given(nodes['panorama' if composed == 'true' else 'stitch'])
+    assert last['cameras'] == list(names)
+    if composed == 'true':
+        assert last['front.source'] == 'topic'
+        assert last['right.camera_info_url'] == '/r.yaml'
+
+
+def test_one_camera(rig):
+    nodes, _ = rig.start(cameras='ring', composed='true', ring_source='0')
+    assert rig.given(nodes['panorama']) == {'cameras': ['ring'], 'ring.source': '0'}
+
+
+def test_an_overlap_file_of_other_cameras_is_a_sentence(rig, overlap_file):
+    with pytest.raises(RuntimeError, match='overlap file of front, rear: it is for the cameras'):
+        rig.start(transforms='true', cameras='front,rear', overlap_file=str(overlap_file))
+
+
+def test_a_pair_that_was_not_found_has_no_transforms(rig, overlap_file):
+    content = ring()
+    del content['overlaps'][1]['yaw_deg']
+    content['overlaps'][1]['found'] = False
+    overlap_file.write_text(yaml.safe_dump(content))
+    with pytest.raises(RuntimeError, match='holds no angle between the cameras; give yaw_deg'):
+        rig.start(transforms='true', cameras=','.join(RING), overlap_file=str(overlap_file))
 
 
 @pytest.mark.parametrize('kind', KINDS)
@@ -214,7 +310,7 @@ def test_transforms_wait_for_a_file_that_is_not_there_yet(rig, tmp_path):
 )
 def test_a_foreign_file_is_a_sentence(rig, overlap_file, content):
     overlap_file.write_text(content)
-    with pytest.raises(RuntimeError, match='is not the overlap file of two cameras'):
+    with pytest.raises(RuntimeError, match='is not the overlap file of left, right: '):
         rig.start(transforms='true', overlap_file=str(overlap_file))
 
 

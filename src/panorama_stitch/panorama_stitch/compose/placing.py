@@ -156,9 +156,10 @@ def leads_around(views: Sequence[View]) -> bool:
     axes = _axis_columns(views, grid)
     (first, _), (_, last) = _columns(views[0], grid, axes[0]), _columns(views[-1], grid, axes[-1])
     if len(views) == 1:
-        return last - first >= grid.width - 1
+        return bool(last - first >= grid.width - 1)
     to_first = grid.width - (axes[-1] - axes[0])
-    return first + grid.width < last and 0 < to_first < _WIDEST_STEP_RAD * grid.focal_px
+    # A plain bool: in a message NumPy's own would be false.
+    return bool(first + grid.width < last and 0 < to_first < _WIDEST_STEP_RAD * grid.focal_px)
 
 
 def _grid(first: View, wraps: bool) -> Surface:
