@@ -8,7 +8,7 @@ import argparse
 import sys
 
 import numpy as np
-from rigs import random_lens
+from mounts import random_lens
 from scenes import Post, Scene
 from scipy.spatial.transform import Rotation
 from worlds import STYLES, random_world

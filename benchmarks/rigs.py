@@ -7,18 +7,17 @@ body, lens, size, overlap, tilt, distance between the lenses, exposure, noise an
 import os
 from dataclasses import dataclass, field
 from functools import lru_cache
-from math import radians
 from pathlib import Path
 
 import cv2
 import numpy as np
+from mounts import half_width_rad, random_attitudes, random_lenses
 from scenes import FAR, Scene, random_things
 from scipy.spatial.transform import Rotation
 from worlds import STYLES, random_world
 
-from fisheye_geometry.lens import FisheyeLens, Lens, PinholeLens
+from fisheye_geometry.lens import Lens, PinholeLens
 
-SIZES = ((320, 240), (640, 480), (640, 480), (800, 600), (1280, 960))
 PLACES = Path(os.environ.get('FISHEYE_PLACES', ''))
 """Folder of equirectangular pictures of real places, if there are any, to look at beside random
 worlds."""
@@ -70,11 +69,11 @@ def random_rig(seed: int, *, common: bool = True, held_out: bool = False) -> Ran
     if not (common or opposite):
         other = _elsewhere(rng, style, held_out)
     overlap_deg = rng.uniform(8, 60)
-    lenses = _lenses(rng, 170.0 if opposite else 200.0)
-    reach_deg = [np.degrees(_half_width_rad(lens)) for lens in lenses]
+    lenses = random_lenses(rng, 170.0 if opposite else 200.0)
+    reach_deg = [np.degrees(half_width_rad(lens)) for lens in lenses]
     yaw_deg = min(sum(reach_deg) - overlap_deg, 180.0)
     overlap_deg = sum(reach_deg) - yaw_deg
-    attitudes = _attitudes(rng, 180.0, 0.1) if opposite else _attitudes(rng, yaw_deg)
+    attitudes = random_attitudes(rng, 180.0, 0.1) if opposite else random_attitudes(rng, yaw_deg)
     baseline_m = rng.uniform(0.02, 0.3)
     place = np.array([baseline_m / 2, *(rng.normal(0, 0.05, 2) * baseline_m)])
     scene, near_share = Scene(world), 0.0
@@ -160,65 +159,6 @@ def _texture(rng):
         noise += cv2.resize(layer, (256, 256), interpolation=cv2.INTER_CUBIC) / cells**0.5
     noise = (noise - noise.mean()) / noise.std()
     return np.clip(rng.uniform(60, 180) + noise * rng.uniform(5, 50), 2, 250).astype(np.float32)
-
-
-def _lenses(rng, widest_deg):
-    width, height = SIZES[rng.integers(len(SIZES))]
-    kind = rng.random()
-    fov = 78.0 if kind < 0.15 else min(rng.choice([150.0, 170.0, 170.0, 185.0, 200.0]), widest_deg)
-    if fov < 90:
-        focal = width / 2 / np.tan(radians(fov) / 2)
-        lens = PinholeLens(
-            width, height, focal, focal, (width - 1) / 2, (height - 1) / 2, (-0.05, 0.01, 0, 0)
-        )
-        return lens, lens
-    first = random_lens(rng, width, height, fov)
-    if rng.random() < 0.8:
-        return first, first
-    return first, random_lens(rng, *SIZES[rng.integers(len(SIZES))], rng.choice([150.0, 170.0]))
-
-
-def random_lens(rng, width: int, height: int, fov_deg: float) -> FisheyeLens:
-    """Make a fisheye whose image circle is as wide as its picture."""
-    edge = radians(fov_deg) / 2
-    distortion = tuple(np.array([-0.02, 0.004, -0.001, 0.0001]) * rng.uniform(0, 2))
-    unit = FisheyeLens(width, height, 1.0, 1.0, 0.0, 0.0, distortion)
-    radius, _ = unit.project(np.array([np.sin(edge), 0.0, np.cos(edge)]))
-    focal = width / 2 / float(radius[0])
-    shift = rng.uniform(-0.01, 0.01, 2) * width
-    return FisheyeLens(
-        width,
-        height,
-        focal,
-        focal,
-        (width - 1) / 2 + shift[0],
-        (height - 1) / 2 + shift[1],
-        distortion,
-        visible_angle_rad=edge,
-    )
-
-
-def _half_width_rad(lens):
-    return min(
-        lens.angle_at(-0.5, lens.center_y_px), lens.angle_at(lens.width - 0.5, lens.center_y_px)
-    )
-
-
-def _attitudes(rng, yaw_deg, tilt_scale=1.0):
-    """Rotations of both cameras' rays to the scene: tilted, leaning, or turned over, or level."""
-    tilt = np.zeros((2, 2))
-    kind = rng.integers(4)
-    if kind == 1:
-        tilt[:] = rng.uniform(-20, 20), 0
-    elif kind == 2:
-        tilt = rng.uniform(-10, 10, (2, 2))
-    elif kind == 3:
-        tilt = rng.uniform(-3, 3, (2, 2))
-    over = 180.0 if rng.random() < 0.1 else 0.0
-    return tuple(
-        Rotation.from_euler('YXZ', [side * yaw_deg / 2, pitch, roll + over], degrees=True)
-        for side, (pitch, roll) in zip((-1, 1), tilt * tilt_scale, strict=True)
-    )
 
 
 def _look(scene, lens, turn, origin):

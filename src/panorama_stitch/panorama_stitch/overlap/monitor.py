@@ -11,9 +11,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from panorama_stitch.overlap.parallax import fit_far, stepped
+from panorama_stitch.overlap.patches import cast_votes
 from panorama_stitch.overlap.strips import draw_strips, seam_frame
 from panorama_stitch.overlap.view import View
-from panorama_stitch.overlap.votes import Votes, cast_votes, pooled, thinned
+from panorama_stitch.overlap.votes import Votes, pooled, thinned
 
 _DENSITY = 115.0
 _ALONG_RAD, _ACROSS_RAD = np.radians((-3.5, 4.5)), np.radians(3.0)

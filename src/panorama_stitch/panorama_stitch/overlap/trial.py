@@ -7,9 +7,10 @@ from math import radians
 import numpy as np
 
 from panorama_stitch.overlap.parallax import Fit, fit_far, stepped
+from panorama_stitch.overlap.patches import cast_votes
 from panorama_stitch.overlap.strips import draw_strips
 from panorama_stitch.overlap.view import View
-from panorama_stitch.overlap.votes import Votes, cast_votes, pooled
+from panorama_stitch.overlap.votes import Votes, pooled
 
 
 @dataclass(frozen=True)
