@@ -12,10 +12,10 @@ import numpy as np
 
 from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens
+from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.camera_file import read_camera
 from fisheye_geometry.image_circle import ImageCircle
 from fisheye_geometry.lens import Lens
-from fisheye_geometry.remap import Turn
 from panorama_stitch.overlap.overlap_result import Overlap
 from panorama_stitch.pipeline.panorama_settings import PanoramaSettings
 from panorama_stitch.pipeline.rig_state import RigState
@@ -51,7 +51,7 @@ def synthetic_pair(width: int, height: int, gains: Sequence[float] = (1.0, 1.0))
     """Photograph the synthetic world with two exposures."""
     lens = synthetic_lens(width, height, radians(170))
     images = [
-        Scene().view(lens, Turn(yaw_rad=yaw), gain).frame(0)
+        Scene().view(lens, Attitude(yaw_rad=yaw), gain).frame(0)
         for yaw, gain in zip(YAWS, gains, strict=True)
     ]
     return ImagePair('synthetic', [lens, lens], images, is_synthetic=True)

@@ -22,7 +22,7 @@ from similarity import similarity_map
 
 from fisheye_capture.scene import Scene
 from fisheye_core.errors import FisheyeError
-from fisheye_geometry.remap import Turn
+from fisheye_geometry.attitude import Attitude
 from panorama_stitch.compose.compositor import BLENDS, Compositor
 from panorama_stitch.pipeline.panorama_settings import PanoramaSettings
 
@@ -161,7 +161,7 @@ def flicker(pair: ImagePair, compositor: Compositor, columns: slice, gains) -> f
     out = np.empty((surface.height, surface.width, 3), np.uint8)
     if pair.is_synthetic:
         views = [
-            Scene().view(lens, Turn(yaw_rad=yaw), gain)
+            Scene().view(lens, Attitude(yaw_rad=yaw), gain)
             for lens, yaw, gain in zip(pair.lenses, YAWS, gains, strict=True)
         ]
         width = columns.stop - columns.start

@@ -9,8 +9,8 @@ import cv2
 
 from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens
+from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.camera_file import Camera, write_camera
-from fisheye_geometry.remap import Turn
 from fisheye_testing.health import Health
 from fisheye_testing.mjpeg_server import MjpegServer
 from fisheye_testing.rig import SIDES, RigProcesses, wait_for
@@ -27,7 +27,7 @@ def write_pictures(folder: Path) -> None:
     """Write what two cameras see of the synthetic scene, with their exact calibrations."""
     lens = synthetic_lens(640, 480, radians(170))
     for side, yaw_deg in zip(SIDES, (-70, 70), strict=True):
-        picture = Scene().view(lens, Turn(radians(yaw_deg))).frame(0)
+        picture = Scene().view(lens, Attitude(radians(yaw_deg))).frame(0)
         cv2.imwrite(str(folder / f'{side}.jpg'), picture)
         write_camera(folder / f'{side}.yaml', Camera(side, lens))
 

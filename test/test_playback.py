@@ -14,8 +14,8 @@ from fisheye_bridge.qos import IMAGE
 from fisheye_bridge.stamps import stamp_of
 from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens
+from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.camera_file import Camera
-from fisheye_geometry.remap import Turn
 from fisheye_testing.image_message import to_message
 from fisheye_testing.rig import wait_for
 
@@ -35,7 +35,7 @@ class Player:
         self._clock = self._node.create_publisher(Clock, '/clock', 10)
         self._eyes = [
             (
-                Scene().view(LENS, Turn(np.radians(yaw_deg))),
+                Scene().view(LENS, Attitude(np.radians(yaw_deg))),
                 camera_info_of(Camera(side, LENS), Header(frame_id=f'{side}_optical_frame')),
                 self._node.create_publisher(Image, f'/{side}/image_raw', IMAGE),
                 self._node.create_publisher(CameraInfo, f'/{side}/camera_info', IMAGE),

@@ -16,14 +16,19 @@ from fisheye_core.errors import FisheyeError
 
 
 class CameraPicture(Protocol):
-    """What a camera gives."""
+    """An image of a camera, with its JPEG where the camera coded it."""
 
-    size: tuple[int, int]
-    """Width and height, px."""
-    image: np.ndarray
-    """(height, width[, 3]) uint8; possibly decoded only now."""
-    jpeg: np.ndarray | None
-    """(n,) uint8; None if the camera gave pixels."""
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height, px."""
+
+    @property
+    def image(self) -> np.ndarray:
+        """(height, width[, 3]) uint8; possibly decoded only now."""
+
+    @property
+    def jpeg(self) -> np.ndarray | None:
+        """(n,) uint8; None if the camera gave pixels."""
 
 
 class ImagePublisher:

@@ -7,14 +7,15 @@ _JUMP_NS = 10_000_000_000
 
 
 class ArrivalClock:
-    """Takes times of the stream to times of arrival, as if no picture had been held up.
+    """Clock that maps times of the stream to times of arrival, as if no picture had been held up.
 
     After a hiccup pictures come in a burst. Their own times say how far apart they were taken, and
     those that came without delay, how the two clocks lie: the smallest difference of late.
     """
 
     def __init__(self):
-        self._smallest_ns = self._former_ns = None
+        self._smallest_ns: int | None = None
+        self._former_ns = 0
         self._since_ns = 0
 
     def stamp_ns(self, media_ns: int | None, arrival_ns: int) -> int:

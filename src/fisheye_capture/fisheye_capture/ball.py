@@ -28,7 +28,7 @@ class Ball:
 
     @classmethod
     def at(cls, stamp_ns: int) -> 'Ball':
-        """Give the ball at a time since the epoch."""
+        """Return the ball at a time since the epoch."""
         phase = 2 * pi * (stamp_ns % PERIOD_NS) / PERIOD_NS
         bearing = _REACH_RAD * sin(phase)
         return cls(bearing, _LOWEST_RAD + _BOUNCE_RAD * abs(sin(3 * phase)), 4 * bearing)
@@ -43,14 +43,14 @@ class Ball:
         return np.array([right, np.cross(forward, right), forward])
 
     def rim(self) -> np.ndarray:
-        """Give directions (N, 3) just around the ball."""
+        """Return directions (N, 3) just around the ball."""
         angle = np.linspace(0, 2 * pi, 32, endpoint=False)
         radius = tan(1.1 * _RADIUS_RAD)
         local = [radius * np.cos(angle), radius * np.sin(angle), np.ones_like(angle)]
         return np.stack(local, axis=-1) @ self.axes
 
     def seen_along(self, rays: np.ndarray, px_per_rad: float) -> tuple[np.ndarray, np.ndarray]:
-        """Tell what a picture shows of the ball.
+        """Return what an image shows of the ball.
 
         Parameters
         ----------

@@ -63,7 +63,7 @@ class Canvas:
 
 
 def around(bearing_rad: float, distance_m: float, y_m: float = 0.0) -> np.ndarray:
-    """Give the point at a bearing and a distance over ground, y below the eye."""
+    """Return the point at a bearing and a distance over ground, y below the eye."""
     return np.array([np.sin(bearing_rad) * distance_m, y_m, np.cos(bearing_rad) * distance_m])
 
 
@@ -89,7 +89,7 @@ class Face:
     light: float
 
     def at(self, points: np.ndarray) -> np.ndarray:
-        """Take points (N, 2), m right of and above the lower left corner, to space (N, 3)."""
+        """Map points (N, 2), m right of and above the lower left corner, to space (N, 3)."""
         u, v = points.T
         return self.origin + u[:, None] * self.right - v[:, None] * (0.0, 1.0, 0.0)
 
@@ -97,7 +97,7 @@ class Face:
 def faces_of_box(
     center: np.ndarray, turn_rad: float, width_m: float, depth_m: float
 ) -> Iterator[Face]:
-    """Give the upright faces of a box that the viewer sees; `center` (3,) is on the ground."""
+    """Return the upright faces of a box that the viewer sees; `center` (3,) is on the ground."""
     for quarter in range(4):
         angle = turn_rad + quarter * pi / 2
         outward, right = around(angle + pi, 1.0), around(angle + pi / 2, 1.0)

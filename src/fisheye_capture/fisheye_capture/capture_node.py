@@ -58,7 +58,7 @@ class CaptureNode(Node):
         super().destroy_node()
 
     def _calibration(self) -> Camera | None:
-        """Give the camera of the calibration file, else what the source knows of itself."""
+        """Return the camera of the calibration file, else what the source knows of itself."""
         path = self._calibration_path
         if path is None:
             camera = self._grabber.camera
@@ -89,11 +89,11 @@ class CaptureNode(Node):
         self._fault = (
             camera.size_mismatch(width, height) if camera else 'the camera is not calibrated'
         )
-        if self._fault:
+        if camera and not self._fault:
+            self._info = camera_info_of(camera, Header())
+        else:
             self._info = CameraInfo(width=width, height=height)
             self.get_logger().warning(f'{self._fault}: camera_info is published without K')
-        else:
-            self._info = camera_info_of(camera, Header())
 
     def _set_camera_info(self, request, response):
         """Write the calibration file and use it from the next picture on."""

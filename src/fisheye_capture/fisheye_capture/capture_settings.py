@@ -125,7 +125,7 @@ class CameraSettings:
     )
 
     def named(self, name: str) -> 'CameraSettings':
-        """Give these settings with all that follows from the camera's name filled in.
+        """Return these settings with all that follows from the camera's name filled in.
 
         Parameters
         ----------

@@ -79,5 +79,5 @@ class Decoder:
                 self.damaged += self.has_begun
 
     def expect_keyframe(self) -> None:
-        """Give nothing out before the next keyframe: what is between would be drawn upon a gap."""
+        """Withhold frames until the next keyframe: those between would be drawn upon a gap."""
         self._waits, self._damaged_s = True, time.monotonic()

@@ -31,7 +31,7 @@ class SequenceSource(PacedSource):
     """Pictures in turn, all of one size: those of a folder or the frames of a video."""
 
     def __init__(self, settings: CaptureSettings, pictures: Iterator[tuple[str, np.ndarray]]):
-        """Take the pictures, each with a name; their end is the end of the source."""
+        """Start with pictures, each with a name; their end is the end of the source."""
         super().__init__(settings.frame_rate_hz)
         self._encoding = settings.encoding
         first = next(pictures)
@@ -39,9 +39,10 @@ class SequenceSource(PacedSource):
         self._pictures = chain([first], pictures)
 
     def _picture(self, stamp_ns):
-        name, image = next(self._pictures, (None, None))
-        if name is None:
-            raise SourceEndedError('the last picture was shown (loop is false)')
+        try:
+            name, image = next(self._pictures)
+        except StopIteration:
+            raise SourceEndedError('the last picture was shown (loop is false)') from None
         if image.shape != self._shape:
             raise SourceError(
                 f'{name} has {image.shape[1]}x{image.shape[0]} px; '
@@ -51,7 +52,7 @@ class SequenceSource(PacedSource):
 
 
 def folder_pictures(paths: Sequence[Path], loop: bool) -> Iterator[tuple[str, np.ndarray]]:
-    """Give pictures in turn; a `SourceError` for one that cannot be read."""
+    """Yield pictures in turn; a `SourceError` for one that cannot be read."""
     while True:
         for path in paths:
             yield str(path), read_picture(path)
@@ -60,7 +61,7 @@ def folder_pictures(paths: Sequence[Path], loop: bool) -> Iterator[tuple[str, np
 
 
 def video_pictures(path: Path, loop: bool) -> Iterator[tuple[str, np.ndarray]]:
-    """Give the frames of a video; a `SourceError` if it has none."""
+    """Yield the frames of a video; a `SourceError` if it has none."""
     while True:
         video = cv2.VideoCapture(str(path))
         # A calibration knows nothing of a turned picture.

@@ -83,7 +83,7 @@ class Grabber:
         return f'{reason} (attempts to reopen: {self.attempts})' if reason else ''
 
     def news(self, reason: str) -> str:
-        """Say that the frames stopped, and why, or with '' that they come."""
+        """Note that the frames stopped, and why, or with '' that they come."""
         if reason:
             return f'no pictures: {reason}'
         return f'pictures come; {self.note}' if self.note else 'pictures come'
@@ -126,7 +126,7 @@ class Grabber:
             source.close()
 
     def _run(self):
-        wait_s = _FIRST_WAIT_S
+        wait_s: float | None = _FIRST_WAIT_S
         while not self._stopping.is_set():
             frames = self.frames
             try:
@@ -138,7 +138,8 @@ class Grabber:
             except FisheyeError as error:
                 came = self.frames > frames
                 self.attempts += not came
-                wait_s = min(_FIRST_WAIT_S if came else 2 * wait_s, self._settings.reconnect_max_s)
+                longer_s = _FIRST_WAIT_S if came or wait_s is None else 2 * wait_s
+                wait_s = min(longer_s, self._settings.reconnect_max_s)
                 self._change(str(error))
             finally:
                 self._release()

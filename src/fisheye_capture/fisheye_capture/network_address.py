@@ -71,7 +71,7 @@ def tells_of_loss(said: list[tuple[int, str, str]]) -> bool:
 
 
 def refusal(request: StreamRequest, error: Exception) -> str:
-    """Say in a sentence why a camera could not be opened, and what to do."""
+    """Explain in a sentence why a camera could not be opened, and what to do."""
     shown = request.shown
     kinds = {
         av.error.HTTPUnauthorizedError: 'refuses the user or password (401)',

@@ -22,7 +22,7 @@ class Pace:
 
     def __init__(self, rate_hz: float):
         self._period_ns = round(_NS_PER_S / rate_hz)
-        self._last_ns = None
+        self._last_ns: int | None = None
         self._interrupted = Event()
         self.skipped = 0
 
@@ -58,12 +58,12 @@ class PacedSource(Source):
         self._pace = Pace(rate_hz)
 
     @property
-    def skipped(self) -> int:
+    def skipped(self) -> int:  # type: ignore[override]  # counted by the pace
         """Frames that were due while the one before was still in work."""
         return self._pace.skipped
 
     def read(self) -> Frame:
-        """Wait for the next point of the time grid; give its picture."""
+        """Wait for the next point of the time grid and return its frame."""
         stamp_ns = self._pace.wait()
         return Frame(stamp_ns, self._picture(stamp_ns))
 
@@ -73,4 +73,4 @@ class PacedSource(Source):
 
     @abstractmethod
     def _picture(self, stamp_ns: int) -> np.ndarray:
-        """Give the picture of a time."""
+        """Return the picture of a time."""

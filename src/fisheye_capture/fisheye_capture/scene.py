@@ -12,8 +12,8 @@ import numpy as np
 
 from fisheye_capture.ball import Ball
 from fisheye_capture.town import paint_town
+from fisheye_geometry.attitude import LEVEL, Attitude
 from fisheye_geometry.lens import Lens
-from fisheye_geometry.remap import LEVEL, Turn
 from fisheye_geometry.surface import Surface
 
 _OVERSAMPLING = 2.0
@@ -31,7 +31,9 @@ class Scene:
 
     seed: int = 2
 
-    def view(self, source: Lens | Surface, turn: Turn = LEVEL, gain: float = 1.0) -> 'View':
+    def view(
+        self, source: Lens | Surface, turn: Attitude = LEVEL, gain: float = 1.0
+    ) -> 'SceneView':
         """Look at the scene.
 
         Parameters
@@ -44,13 +46,13 @@ class Scene:
         gain
             Exposure.
         """
-        return View(self.seed, source, turn, gain)
+        return SceneView(self.seed, source, turn, gain)
 
 
-class View:
+class SceneView:
     """What a lens or a surface shows of the scene: `frame` gives it at any time."""
 
-    def __init__(self, seed: int, source: Lens | Surface, turn: Turn, gain: float):
+    def __init__(self, seed: int, source: Lens | Surface, turn: Attitude, gain: float):
         self._source, self._to_world, self._gain = source, turn.matrix.T, gain
         self._px_per_rad = source.focal_x_px if isinstance(source, Lens) else source.focal_px
         self._size = np.array([source.width, source.height])
@@ -68,7 +70,7 @@ class View:
             self._rays[rows] = rays
 
     def frame(self, stamp_ns: int) -> np.ndarray:
-        """Give the picture (height, width, 3) uint8 BGR of a time; always a new array."""
+        """Return the picture (height, width, 3) uint8 BGR of a time; always a new array."""
         image = self._background.copy()
         ball = Ball.at(stamp_ns)
         patch = self._patch(ball)

@@ -37,7 +37,7 @@ class Slots:
     def fit(self, number: int, size: int) -> tuple[np.ndarray, tuple[int, ...]]:
         """Return a slot's memory (size,) uint8 and, if it is new, the file to send along."""
         memory = self._slots.get(number)
-        files = ()
+        files: tuple[int, ...] = ()
         if memory is None or len(memory) < size:
             file = os.memfd_create('picture')
             os.ftruncate(file, size)
@@ -62,7 +62,7 @@ class SlotPool:
         return self._count - 1
 
     def put_back(self, number: int) -> None:
-        """Have a slot that was not used be free again."""
+        """Free a slot that was not used."""
         self._free.append(number)
 
     def array(self, number: int, size: int, files: list[int]) -> np.ndarray:

@@ -62,7 +62,7 @@ class JpegFrame:
 
 
 class Source(ABC):
-    """Gives frames, one after the other.
+    """Camera or file that delivers frames one after the other.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ class Source(ABC):
         """
 
     def interrupt(self) -> None:  # noqa: B027
-        """Have a `read` that waits in another thread end soon, with a `SourceError`."""
+        """End a `read` that waits in another thread, with a `SourceError`."""
 
     def close(self) -> None:  # noqa: B027
         """Release what the source holds; no `read` may be under way."""

@@ -5,13 +5,13 @@ import re
 from pathlib import Path
 
 from fisheye_capture.capture_settings import CaptureSettings
+from fisheye_capture.device import DeviceSource
 from fisheye_capture.files import (
     PictureSource,
     SequenceSource,
     folder_pictures,
     video_pictures,
 )
-from fisheye_capture.live import DeviceSource
 from fisheye_capture.network_request import SCHEMES
 from fisheye_capture.source import Source, shown_source
 from fisheye_capture.stream import StreamSource

@@ -14,7 +14,7 @@ from contextlib import suppress
 from dataclasses import asdict
 
 from fisheye_capture.capture_settings import CaptureSettings
-from fisheye_capture.live import BROKEN_IN_A_ROW, check_size, jpeg_frame
+from fisheye_capture.device import BROKEN_IN_A_ROW, check_size, jpeg_frame
 from fisheye_capture.network_request import StreamRequest
 from fisheye_capture.shared_frames import SlotPool, receive, send
 from fisheye_capture.source import Frame, JpegFrame, Source, SourceLostError, shown_source

@@ -5,6 +5,7 @@ from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 from threading import Condition, Thread
+from typing import Any
 
 import av
 
@@ -24,12 +25,12 @@ _MAX_STAMPS = 100
 
 
 @dataclass(frozen=True)
-class Picture:
+class StreamPicture:
     """A picture as it came: a JPEG, or decoded but still in the stream's own pixel format."""
 
     stamp_ns: int
     jpeg: bytes | None = None
-    frame: 'av.VideoFrame | None' = None
+    frame: Any = None  # an av.VideoFrame where it is no JPEG
 
 
 class StreamCamera:
@@ -58,7 +59,7 @@ class StreamCamera:
         self._changed = Condition()
         self._arrivals: deque[Arrival] = deque()
         self._stamps_ns: dict[int | None, int] = {}
-        self._newest: Picture | None = None
+        self._newest: StreamPicture | None = None
         self._end = self._waiting = ''
         self.skipped = 0
         self._heard_s = self._seen_s = time.monotonic()
@@ -75,7 +76,7 @@ class StreamCamera:
         """What a user should know of it now; '' for nothing."""
         return self._waiting or self._reader.note
 
-    def picture(self, timeout_s: float) -> Picture | None:
+    def picture(self, timeout_s: float) -> StreamPicture | None:
         """Wait for a picture that was not given yet; None if there is none in time.
 
         Raises
@@ -122,7 +123,7 @@ class StreamCamera:
             self._changed.notify_all()
 
     def _drain(self):
-        """Take what comes as it comes, whatever becomes of it."""
+        """Drain the stream as it comes, whatever becomes of it."""
         for arrival in self._reader.read():
             with self._changed:
                 self._heard_s = time.monotonic()
@@ -159,13 +160,13 @@ class StreamCamera:
         for _ in range(keys[-1] if keys else 0):
             self.skipped += arrivals.popleft().is_live
 
-    def _pictures(self, arrival: Arrival) -> Iterator[Picture]:
+    def _pictures(self, arrival: Arrival) -> Iterator[StreamPicture]:
         packet = arrival.packet
         if self._codec == 'mjpeg':
-            yield Picture(arrival.stamp_ns, jpeg=bytes(packet))
+            yield StreamPicture(arrival.stamp_ns, jpeg=bytes(packet))
             return
         self._stamps_ns[packet.pts] = arrival.stamp_ns
         for frame in self._decoder.decode(packet, follows_loss=arrival.follows_loss):
-            yield Picture(self._stamps_ns.get(frame.pts, arrival.stamp_ns), frame=frame)
+            yield StreamPicture(self._stamps_ns.get(frame.pts, arrival.stamp_ns), frame=frame)
         while len(self._stamps_ns) > _MAX_STAMPS:
             del self._stamps_ns[next(iter(self._stamps_ns))]

@@ -10,7 +10,7 @@ import numpy as np
 from fisheye_capture.network_address import StreamError
 from fisheye_capture.network_request import StreamRequest
 from fisheye_capture.shared_frames import Slots, receive, send
-from fisheye_capture.stream_camera import Picture, StreamCamera
+from fisheye_capture.stream_camera import StreamCamera, StreamPicture
 
 _PIXELS = {'bgr8': 'bgr24', 'rgb8': 'rgb24', 'mono8': 'gray'}
 """Names of encodings in FFmpeg."""
@@ -42,7 +42,7 @@ def _serve(channel, request):
         note = camera.note
 
 
-def _answer(channel, slots, slot, picture: Picture, encoding, camera):
+def _answer(channel, slots, slot, picture: StreamPicture, encoding, camera):
     answer = {
         'stamp_ns': picture.stamp_ns,
         'damaged': camera.damaged,

@@ -36,7 +36,7 @@ class SyntheticSource(PacedSource):
 
 
 def synthetic_lens(width: int, height: int, fov_rad: float) -> FisheyeLens:
-    """Give the lens whose field of view spans the width of the picture."""
+    """Return the lens whose field of view spans the width of the picture."""
     unit = FisheyeLens(width, height, 1.0, 1.0, 0.0, 0.0, _DISTORTION)
     (edge, _), _ = unit.project(np.array([np.sin(fov_rad / 2), 0.0, np.cos(fov_rad / 2)]))
     focal_px = width / 2 / edge

@@ -18,7 +18,7 @@ from std_msgs.msg import Header
 from fisheye_bridge.camera_info import camera_info_of, camera_of
 from fisheye_bridge.images import from_jpeg, to_array
 from fisheye_bridge.qos import IMAGE
-from fisheye_capture import live, source
+from fisheye_capture import device, source
 from fisheye_capture.capture_node import CaptureNode
 from fisheye_capture.synthetic import synthetic_lens
 from fisheye_core.errors import FileAccessError, FisheyeError, SettingError, SourceError
@@ -50,7 +50,7 @@ class Ear(Node):
 
 @pytest.fixture
 def ros(wait_until):
-    """Give `start`, which builds the node, and `hear`, which spins until a topic was heard."""
+    """Return `start`, which builds the node, and `hear`, which spins until a topic was heard."""
 
     class Ros:
         def __init__(self):
@@ -156,8 +156,8 @@ class JpegDevice:
 
 @pytest.fixture
 def jpeg_device(monkeypatch):
-    """Give the path of a device that is there, and whose capture is replaced."""
-    monkeypatch.setattr(live.cv2, 'VideoCapture', lambda *arguments: JpegDevice())
+    """Return the path of a device that is there, and whose capture is replaced."""
+    monkeypatch.setattr(device.cv2, 'VideoCapture', lambda *arguments: JpegDevice())
     with tempfile.NamedTemporaryFile(dir='/dev/shm') as file:
         yield file.name
 

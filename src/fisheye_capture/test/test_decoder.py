@@ -33,7 +33,7 @@ def stream_file(tmp_path_factory):
 
 
 def decoded(path, harm=lambda n, data: data):
-    """Give the numbers of the packets after which a picture came, and the decoder."""
+    """Return the numbers of the packets after which a picture came, and the decoder."""
     numbers = []
     with av.open(str(path)) as container:
         stream = container.streams.video[0]

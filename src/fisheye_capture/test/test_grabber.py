@@ -96,7 +96,7 @@ def test_garbage_from_a_camera_is_never_handed_over(grab, wait_until):
 
 
 class Prepared(Source):
-    """Gives prepared frames; raises prepared errors."""
+    """Source of prepared frames and errors."""
 
     def __init__(self, answers):
         self._answers = answers

@@ -62,7 +62,7 @@ def open_stream(settings):
 
 
 def ages(source, count, pause_s=0.0):
-    """Give the true and the told age of pictures, ms; nan where no time can be read."""
+    """Return the true and the told age of pictures, ms; nan where no time can be read."""
     true, told = [], []
     for _ in range(count):
         frame = source.read()

@@ -11,11 +11,12 @@ import pytest
 from fisheye_capture.ball import PERIOD_NS, Ball
 from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens
+from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.lens import FisheyeLens
-from fisheye_geometry.remap import Turn, remap_table
+from fisheye_geometry.remap import remap_table
 from fisheye_geometry.surface import SURFACES, surface_for
 
-LEFT = Turn(yaw_rad=np.radians(-70))
+LEFT = Attitude(yaw_rad=np.radians(-70))
 AT_SEAM_NS = 200_000_000
 """The ball is then in the view of the left camera and in that of the right one."""
 TRUTH_PSNR_DB = 36.0
@@ -48,7 +49,7 @@ def test_a_corrected_picture_is_the_truth_of_its_surface(kind, size):
 
 
 def test_a_turned_camera_sees_the_same_world():
-    lens, turn = lens_of(640, 480), Turn(0.3, 0.05, -0.04)
+    lens, turn = lens_of(640, 480), Attitude(0.3, 0.05, -0.04)
     surface = surface_for(lens)
     table = remap_table(lens, surface, 'linear', turn)
     corrected = table(Scene().view(lens, turn).frame(AT_SEAM_NS))
@@ -61,9 +62,9 @@ def test_equal_stamps_give_equal_pictures_in_every_process(left):
         'import hashlib, numpy as np\n'
         'from fisheye_capture.scene import Scene\n'
         'from fisheye_capture.synthetic import synthetic_lens\n'
-        'from fisheye_geometry.remap import Turn\n'
+        'from fisheye_geometry.attitude import Attitude\n'
         'lens = synthetic_lens(640, 480, np.radians(170))\n'
-        'view = Scene().view(lens, Turn(yaw_rad=np.radians(-70)))\n'
+        'view = Scene().view(lens, Attitude(yaw_rad=np.radians(-70)))\n'
         f'print(hashlib.sha256(view.frame({AT_SEAM_NS})).hexdigest())\n'
     )
     other = subprocess.run(
@@ -96,7 +97,7 @@ def test_a_frame_belongs_to_who_asked_for_it(left):
 
 
 def test_out_of_sight_the_ball_changes_nothing():
-    behind = Scene().view(lens_of(320, 240), Turn(yaw_rad=np.pi))
+    behind = Scene().view(lens_of(320, 240), Attitude(yaw_rad=np.pi))
     np.testing.assert_array_equal(behind.frame(AT_SEAM_NS), behind.frame(AT_SEAM_NS + 10**9))
 
 

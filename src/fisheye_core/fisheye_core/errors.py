@@ -1,6 +1,7 @@
 """Every error this project raises on purpose: one root, a family for each kind of cause."""
 
 from pathlib import Path
+from typing import Any
 
 
 class FisheyeError(Exception):
@@ -24,7 +25,7 @@ class FileAccessError(FisheyeError):
         super().__init__(f'{path} cannot be {action}: {reason}')
         self.path, self.action, self.reason = path, action, str(reason)
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.path, self.action, self.reason)
 
 
@@ -43,7 +44,7 @@ class FileContentError(FisheyeError):
         super().__init__(f'{path}: {reason}' if path else str(reason))
         self.reason, self.path = str(reason), path
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.reason, self.path)
 
 

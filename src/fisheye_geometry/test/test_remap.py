@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from fisheye_core.errors import GeometryError, ImageFormatError
+from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.lens import make_lens
-from fisheye_geometry.remap import INTERPOLATIONS, RemapTable, Turn, remap_table
+from fisheye_geometry.remap import INTERPOLATIONS, RemapTable, remap_table
 from fisheye_geometry.surface import Surface, surface_for
 
 LENS = make_lens(
@@ -61,7 +62,7 @@ def test_tables_are_cached_and_read_only():
 
 
 def test_a_turn_looks_where_it_says():
-    turn = Turn(yaw_rad=0.2, pitch_rad=0.1, roll_rad=0.3)
+    turn = Attitude(yaw_rad=0.2, pitch_rad=0.1, roll_rad=0.3)
     right, down, forward = turn.matrix.T
     assert np.arctan2(forward[0], forward[2]) == pytest.approx(0.2), 'yaw is to the right'
     assert -np.arcsin(forward[1]) == pytest.approx(0.1), 'pitch is up'

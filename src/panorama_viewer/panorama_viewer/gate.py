@@ -85,7 +85,8 @@ class Gate:
 
     def connection(self, request: web.Request) -> Connection:
         """Return what a request came over; a `ConnectionError` if that has ended."""
-        if connection := self._connections.get(request.transport):
+        transport = request.transport
+        if transport and (connection := self._connections.get(transport)):
             return connection
         raise ConnectionResetError('the client has left')
 

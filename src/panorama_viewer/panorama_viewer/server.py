@@ -120,7 +120,8 @@ class ViewerServer:
         )
         await self._runner.setup()
         host, token = self._settings.host, self._site.token
-        port = await self._gate.open(host, self._settings.port, self._runner.server)
+        serve: Any = self._runner.server  # there since `setup`
+        port = await self._gate.open(host, self._settings.port, serve)
         self.address = f'http://{reachable(host)}:{port}/'
         self.url = self.address + (f'#token={token}' if token else '')
 

@@ -7,8 +7,8 @@ import cv2
 import numpy as np
 import pytest
 
-from fisheye_capture import live
-from fisheye_capture.live import DeviceSource
+from fisheye_capture import device as device_module
+from fisheye_capture.device import DeviceSource
 from fisheye_capture.source import SourceEndedError, SourceLostError
 from fisheye_core.errors import SourceError
 
@@ -49,7 +49,7 @@ class Capture:
 
 
 class JpegCapture(Capture):
-    """Gives what the camera coded when it is told not to convert, as Video4Linux does."""
+    """Device that delivers what the camera coded when told not to convert, as Video4Linux does."""
 
     def retrieve(self):
         is_whole, jpeg = super().retrieve()
@@ -68,7 +68,7 @@ def open_device(monkeypatch, settings, tmp_path):
     def open_it(capture, **changes):
         path = tmp_path / 'video0'
         path.touch()
-        monkeypatch.setattr(live.cv2, 'VideoCapture', lambda *arguments: capture)
+        monkeypatch.setattr(device_module.cv2, 'VideoCapture', lambda *arguments: capture)
         return DeviceSource(settings(path, **changes))
 
     return open_it
@@ -167,10 +167,10 @@ def test_a_slow_device_is_waited_for(open_device, monkeypatch):
     """Its first pictures take longer than one wait of OpenCV's."""
     capture = Capture([GOOD])
     grabs = iter([False, False, True])
-    seconds = itertools.count(step=live._SELECT_TIMEOUT_S)
+    seconds = itertools.count(step=device_module._SELECT_TIMEOUT_S)
     monkeypatch.setattr(capture, 'grab', lambda: next(grabs) and Capture.grab(capture))
     device = open_device(capture)
-    monkeypatch.setattr(live.time, 'monotonic', lambda: next(seconds) / 2)
+    monkeypatch.setattr(device_module.time, 'monotonic', lambda: next(seconds) / 2)
     assert device.read().image.shape == (24, 32, 3)
 
 
