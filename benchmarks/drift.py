@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from worlds import STYLES, random_world
 
 from panorama_stitch.overlap.monitor import SeamMonitor
-from panorama_stitch.overlap.view import View
+from panorama_stitch.overlap.view import OverlapView
 
 SECONDS, MOVED_AT_S = 30, 10
 TURNS_DEG = (0.0, 0.0, 0.0, 0.3, 0.7, 2.0)
@@ -84,13 +84,13 @@ def plain(level: float) -> np.ndarray:
     return np.full((8, 8), level, np.float32)
 
 
-def see(rng, scene, lens, attitude, origin) -> View:
+def see(rng, scene, lens, attitude, origin) -> OverlapView:
     """What a camera of the rig shows at a moment."""
     y, x = np.mgrid[: lens.height, : lens.width]
     rays, lit = lens.unproject(np.stack([x, y], axis=-1))
     light, _ = scene.look(origin, rays @ attitude.as_matrix().T, lens.focal_x_px)
     light = light + rng.normal(0, 3, light.shape)
-    return View(np.where(lit, np.clip(light, 1, 255), 0).astype(np.uint8), lens)
+    return OverlapView(np.where(lit, np.clip(light, 1, 255), 0).astype(np.uint8), lens)
 
 
 if __name__ == '__main__':

@@ -13,7 +13,7 @@ from rigs import random_rig
 
 from panorama_stitch.overlap.confidence import RIGHT_RAD, Evidence
 from panorama_stitch.overlap.measure import measure_rotation
-from panorama_stitch.overlap.view import View
+from panorama_stitch.overlap.view import OverlapView
 
 FIRST_SEED = 1000
 RIDGE = 1.0
@@ -31,7 +31,7 @@ def main() -> int:
     for common, count in ((True, options.rigs), (False, options.apart)):
         for seed in range(FIRST_SEED, FIRST_SEED + count):
             rig = random_rig(seed, common=common)
-            views = View(rig.left, rig.lenses[0]), View(rig.right, rig.lenses[1])
+            views = OverlapView(rig.left, rig.lenses[0]), OverlapView(rig.right, rig.lenses[1])
             result = measure_rotation([views])
             if result.evidence is not None:
                 evidence.append(result.evidence)

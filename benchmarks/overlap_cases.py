@@ -13,7 +13,7 @@ from rigs import random_rig
 from scipy.spatial.transform import Rotation
 
 from fisheye_geometry.camera_file import read_camera
-from panorama_stitch.overlap.view import View
+from panorama_stitch.overlap.view import OverlapView
 
 WIDE_DEG, FAR_SHARE = 15.0, 1 / 3
 """Rigs on which the rotation must be found: so much overlap, and so much of it far."""
@@ -25,8 +25,8 @@ class Case:
 
     group: str
     name: str
-    left: View
-    right: View
+    left: OverlapView
+    right: OverlapView
     rotation: Rotation | None
     common: bool = True
 
@@ -78,9 +78,9 @@ def _real() -> Iterator[Case]:
         yield Case('real apart', f'{one} and {other}', *pair, None, common=False)
 
 
-def _view(folder: Path, camera: str) -> View:
+def _view(folder: Path, camera: str) -> OverlapView:
     image = cv2.imread(str(folder / f'{camera}.png'), cv2.IMREAD_GRAYSCALE)
-    return View(image, read_camera(folder / f'{camera}.yaml').lens)
+    return OverlapView(image, read_camera(folder / f'{camera}.yaml').lens)
 
 
 def _random(seed: int, *, common: bool) -> Case:
@@ -88,5 +88,5 @@ def _random(seed: int, *, common: bool) -> Case:
     able = rig.overlap_deg >= WIDE_DEG and rig.far_share >= FAR_SHARE
     kind = 'near' if rig.about['near'] or rig.about['body'] else 'distant'
     group = 'apart' if not common else f'wide, {kind}' if able else f'narrow, {kind}'
-    views = (View(rig.left, rig.lenses[0]), View(rig.right, rig.lenses[1]))
+    views = (OverlapView(rig.left, rig.lenses[0]), OverlapView(rig.right, rig.lenses[1]))
     return Case(group, rig.name, *views, rig.rotation if common else None, common)

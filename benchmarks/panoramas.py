@@ -35,7 +35,7 @@ from panorama_stitch.compose.layout import covered
 from panorama_stitch.compose.placing import leads_around, place
 from panorama_stitch.compose.posing import views_of_rig
 from panorama_stitch.overlap.measure import measure_rotation
-from panorama_stitch.overlap.view import View as OverlapView
+from panorama_stitch.overlap.view import OverlapView
 
 AROUND_SEAM_DEG = 8.0
 TEXTURE = 12.0

@@ -42,20 +42,20 @@ def real_data():
 
 @pytest.fixture
 def both(tmp_path):
-    """Give what both cameras of the synthetic scene see, side by side in one picture."""
+    """Return what both cameras of the synthetic scene see, side by side in one picture."""
     write_pictures(tmp_path)
     return np.hstack([cv2.imread(str(tmp_path / f'{side}.jpg')) for side in SIDES])
 
 
 @pytest.fixture
 def watcher(domain):
-    """Give a subscriber that also hears the diagnostics."""
+    """Return a subscriber that also hears the diagnostics."""
     with Health(domain) as health:
         yield health
 
 
 def two_of(source, folder, **regions):
-    """Give the parameters of two cameras that are regions of one source."""
+    """Return the parameters of two cameras that are regions of one source."""
     regions = {'left': 'left', 'right': 'right', **regions}
     return {
         f'{side}.{name}': value

@@ -14,7 +14,7 @@ from fisheye_bridge.qos import BEST_EFFORT_INPUT
 from fisheye_bridge.topics import ImageSubscription
 from fisheye_core.errors import CalibrationError, FisheyeError
 from fisheye_geometry.camera import Readout
-from fisheye_geometry.image_circle import CircledLens
+from fisheye_geometry.image_circle import LensWithImageCircle
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.settling import Settling
 
@@ -69,7 +69,7 @@ class CameraSubscription:
         self._node, self._cut = node, cut
         self._on_picture, self._on_lens, self._check = on_picture, on_lens, check
         self._prefix = f'{namespace}/' if namespace else ''
-        self._seen: CircledLens | None = None
+        self._seen: LensWithImageCircle | None = None
         self._content, self._header = '', Header()
         self._picture_size: tuple[int, int] | None = None
         self._refusal, self._is_over, self._note = '', False, ''
@@ -158,7 +158,7 @@ class CameraSubscription:
             self.refuse(error)
             return
         self._content, self._header, self._note = content, message.header, ''
-        self._seen = CircledLens(lens)
+        self._seen = LensWithImageCircle(lens)
 
     def _take_picture(self, image: np.ndarray, encoding: str, header: Header) -> None:
         if self._cut:

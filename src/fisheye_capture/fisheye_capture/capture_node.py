@@ -72,11 +72,10 @@ class CaptureNode(Node):
         settings = self._declared.settings
         header = Header(stamp=stamp_of(frame.stamp_ns), frame_id=self._settings.frame_id)
         try:
-            if self._region:
-                frame = self._region.frame(frame)
-            if self._described != (self._camera, *frame.size):
-                self._describe(self._camera, *frame.size)
-            self._image.publish_picture(frame, settings.encoding, header, settings.jpeg_quality)
+            shown = self._region.frame(frame) if self._region else frame
+            if self._described != (self._camera, *shown.size):
+                self._describe(self._camera, *shown.size)
+            self._image.publish_picture(shown, settings.encoding, header, settings.jpeg_quality)
         except FisheyeError as error:
             self._broken.add(error)
             return

@@ -38,7 +38,7 @@ class Region:
         """
         self.name = name
         box = _BOX.fullmatch(name)
-        self._box = tuple(map(int, box.groups())) if box else ()
+        self._box: tuple[int, ...] = tuple(map(int, box.groups())) if box else ()
         if name not in _HALVES and not (box and min(self._box[2:]) > 0):
             raise SettingError(
                 f"{setting} is '{name}'; expected {', '.join(_HALVES)}, or x,y,w,h in px "
@@ -46,7 +46,7 @@ class Region:
             )
 
     def fault(self, width: int, height: int) -> str:
-        """Say why a frame of a size, px, does not hold the region; '' if it does."""
+        """Explain why a frame of a size, px, does not hold the region; '' if it does."""
         x, y, w, h = self._in(width, height)
         if w and h and x + w <= width and y + h <= height:
             return ''
@@ -74,14 +74,16 @@ class Region:
 
     def frame(self, frame: Frame | JpegFrame) -> 'CutFrame':
         """Return the region's part of a frame, decoded only where its pixels are wanted."""
-        return CutFrame(frame, self, self.box(*frame.size)[2:])
+        _, _, width, height = self.box(*frame.size)
+        return CutFrame(frame, self, (width, height))
 
     def camera(self, camera: Camera) -> Camera:
         """Return the camera whose pictures are the region of another's."""
         return Readout(*self.box(camera.lens.width, camera.lens.height)).of(camera)
 
     def _in(self, width: int, height: int) -> tuple[int, int, int, int]:
-        return self._box or _HALVES[self.name](width, height)
+        x, y, w, h = self._box or _HALVES[self.name](width, height)
+        return x, y, w, h
 
 
 @dataclass(frozen=True)

@@ -90,7 +90,7 @@ def _angles_at(lens: Lens, pixels: np.ndarray) -> np.ndarray:
     return np.where(seen, np.arccos(rays[..., 2].clip(-1, 1)), np.nan).astype(np.float32)
 
 
-class CircledLens:
+class LensWithImageCircle:
     """A lens as far as its light reaches in the pictures that came.
 
     The circle does not change: it is looked for in the first picture, the second, the fourth, ...

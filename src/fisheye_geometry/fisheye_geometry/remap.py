@@ -19,7 +19,6 @@ _INTERPOLATIONS = {
     'cubic': cv2.INTER_CUBIC,
 }
 INTERPOLATIONS = tuple(_INTERPOLATIONS)
-Turn = Attitude
 
 _OUTSIDE_PX = -100
 """Far enough from the picture that no interpolation reaches it."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fisheye_core.errors import CalibrationError
-from fisheye_geometry.image_circle import CircledLens
+from fisheye_geometry.image_circle import LensWithImageCircle
 from fisheye_geometry.lens import AnnularLens, make_lens
 from fisheye_geometry.surface import surface_for
 
@@ -62,7 +62,7 @@ def test_it_unrolls_to_a_surface_that_leads_all_around():
 
 
 def test_its_picture_is_no_circle_to_look_for():
-    seen = CircledLens(MIRROR)
+    seen = LensWithImageCircle(MIRROR)
     picture = np.zeros((400, 480), np.uint8)
     picture[150:250, 200:280] = 200
     assert seen.look(picture)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fisheye_geometry.image_circle import CircledLens, ImageCircle
+from fisheye_geometry.image_circle import ImageCircle, LensWithImageCircle
 from fisheye_geometry.lens import make_lens
 
 LENS = make_lens('equidistant', 640, 480, [150, 0, 310, 0, 150, 245, 0, 0, 1], [-0.02, 0, 0, 0])
@@ -54,7 +54,7 @@ def test_a_picture_of_another_size_is_ignored():
 
 
 def test_the_circle_of_a_lens_is_looked_for_ever_more_seldom():
-    seen = CircledLens(LENS)
+    seen = LensWithImageCircle(LENS)
     whole = seen.lens
     assert seen.look(np.zeros((LENS.height, LENS.width), np.uint8)), 'the first is always news'
     told = [seen.look(picture(70, 120, 3)) for _ in range(3)]
@@ -67,7 +67,7 @@ ENDING = make_lens('equidistant', 640, 480, [250, 0, 320, 0, 250, 240, 0, 0, 1],
 
 
 def test_a_lens_that_ends_within_its_pictures_is_told():
-    seen = CircledLens(ENDING)
+    seen = LensWithImageCircle(ENDING)
     seen.look(np.zeros((480, 640, 3), np.uint8))
     assert seen.note == '', 'a dark picture may be one within its circle'
     seen.look(np.full((480, 640, 3), 120, np.uint8))
@@ -79,11 +79,11 @@ def test_a_lens_that_ends_within_its_pictures_is_told():
 
 
 def test_a_lens_whose_circle_ends_first_is_not_told():
-    seen = CircledLens(ENDING)
+    seen = LensWithImageCircle(ENDING)
     y, x = np.mgrid[0:480, 0:640]
     circle = 200 * (np.hypot(x - 320, y - 240) < 140)
     assert seen.look(circle.astype(np.uint8))
     assert seen.note == ''
-    seen = CircledLens(LENS)
+    seen = LensWithImageCircle(LENS)
     assert seen.look(picture(180, 120, 3))
     assert seen.note == ''

@@ -8,10 +8,11 @@ import cv2
 import numpy as np
 import pytest
 
+from fisheye_geometry.attitude import LEVEL, Attitude
 from fisheye_geometry.camera_file import read_camera
 from fisheye_geometry.image_circle import ImageCircle
 from fisheye_geometry.lens import FisheyeLens
-from fisheye_geometry.remap import LEVEL, RemapTable, Turn
+from fisheye_geometry.remap import RemapTable
 from fisheye_geometry.surface import Surface, surface_for
 from panorama_stitch.compose.placing import place
 from panorama_stitch.compose.posing import views_at_overlaps
@@ -63,7 +64,7 @@ def look(world: np.ndarray, surface: Surface, yaw_deg: float, lens: FisheyeLens)
     sphere = Surface(
         'equirectangular', width, height, width / 2 / pi, (width - 1) / 2, (height - 1) / 2
     )
-    picture = RemapTable(sphere, surface, attitude=Turn(-radians(yaw_deg)))(world)
+    picture = RemapTable(sphere, surface, attitude=Attitude(-radians(yaw_deg)))(world)
     return np.where(RemapTable(lens, surface).valid, np.maximum(picture, 1), 0).astype(np.uint8)
 
 
@@ -78,9 +79,9 @@ def pair(
     return views, (surface, surface), surface.focal_px * radians(yaw_deg)
 
 
-def tilted(picture: np.ndarray, surface: Surface, turn: Turn) -> np.ndarray:
+def tilted(picture: np.ndarray, surface: Surface, turn: Attitude) -> np.ndarray:
     """Return the picture that a turn about one axis makes level again."""
-    back = Turn(-turn.yaw_rad, -turn.pitch_rad, -turn.roll_rad)
+    back = Attitude(-turn.yaw_rad, -turn.pitch_rad, -turn.roll_rad)
     return RemapTable(surface, surface, attitude=back)(picture)
 
 
@@ -106,7 +107,7 @@ def data_folder(name: str) -> Path:
     return folder
 
 
-def real_views(name: str, kind: str = 'cylindrical', turn: Turn = LEVEL):
+def real_views(name: str, kind: str = 'cylindrical', turn: Attitude = LEVEL):
     """Return ((left, right) grey, surfaces) of a rig of real pictures, the right one turned."""
     folder = data_folder('rigs') / name
     pictures, surfaces = [], []

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scenes import exposed, pair, tilted
 
-from fisheye_geometry.remap import Turn
+from fisheye_geometry.attitude import Attitude
 from panorama_stitch.overlap.alignment import align, overlap_score, refine
 from panorama_stitch.overlap.particles import facing_halves
 from panorama_stitch.overlap.pose import Pose
@@ -22,7 +22,9 @@ def facing_pair(views, surfaces, px_per_deg):
 
 
 @pytest.mark.parametrize('kind', ['cylindrical', 'equirectangular'])
-@pytest.mark.parametrize('turn', [Turn(0, radians(1.7)), Turn(0, 0, radians(-1.9)), Turn()])
+@pytest.mark.parametrize(
+    'turn', [Attitude(0, radians(1.7)), Attitude(0, 0, radians(-1.9)), Attitude()]
+)
 def test_finds_a_turn_from_an_offset_that_is_a_little_off(kind, turn):
     (left, right), surfaces, true_px = pair(kind)
     right = exposed(tilted(right, surfaces[1], turn), 0.8, noise=4)
@@ -45,7 +47,9 @@ def test_finds_a_turn_from_an_offset_that_is_a_little_off(kind, turn):
 
 def test_without_tilt_only_the_offset_moves():
     (left, right), surfaces, true_px = pair()
-    facing = facing_pair((left, tilted(right, surfaces[1], Turn(0, radians(1)))), surfaces, 2.0)
+    facing = facing_pair(
+        (left, tilted(right, surfaces[1], Attitude(0, radians(1)))), surfaces, 2.0
+    )
     pose = align(facing, Pose(true_px / 2 - 160, 0.0), tilt=False)
     assert abs(pose.pitch_rad) + abs(pose.roll_rad) < 1e-6
 

@@ -10,9 +10,8 @@ from scenes import placed_at
 
 from fisheye_capture.scene import Scene
 from fisheye_core.errors import ImageFormatError
-from fisheye_geometry.attitude import LEVEL
+from fisheye_geometry.attitude import LEVEL, Attitude
 from fisheye_geometry.lens import make_lens
-from fisheye_geometry.remap import Turn
 from fisheye_geometry.surface import surface_for
 from panorama_stitch.compose.compositor import BLENDS, Compositor
 from panorama_stitch.compose.gain import GainCompensation
@@ -41,7 +40,9 @@ OFFSET = YAW * SURFACE.focal_px
 
 @pytest.fixture(scope='module')
 def pictures():
-    return [Scene().view(LENS, Turn(yaw_rad=yaw)).frame(STAMP_NS) for yaw in (-YAW / 2, YAW / 2)]
+    return [
+        Scene().view(LENS, Attitude(yaw_rad=yaw)).frame(STAMP_NS) for yaw in (-YAW / 2, YAW / 2)
+    ]
 
 
 def views_of(pictures, corrected):
@@ -206,10 +207,10 @@ def test_a_vertical_offset_moves_the_right_frame_down(pictures):
 
 
 def test_a_turned_camera_is_levelled():
-    turn = Turn(pitch_rad=np.radians(2), roll_rad=np.radians(-1.5))
-    attitude = Turn(yaw_rad=YAW / 2, pitch_rad=turn.pitch_rad, roll_rad=turn.roll_rad)
+    turn = Attitude(pitch_rad=np.radians(2), roll_rad=np.radians(-1.5))
+    attitude = Attitude(yaw_rad=YAW / 2, pitch_rad=turn.pitch_rad, roll_rad=turn.roll_rad)
     images = [
-        Scene().view(LENS, Turn(yaw_rad=-YAW / 2)).frame(STAMP_NS),
+        Scene().view(LENS, Attitude(yaw_rad=-YAW / 2)).frame(STAMP_NS),
         Scene().view(LENS, attitude).frame(STAMP_NS),
     ]
     level = [View(LENS, SURFACE)] * 2

@@ -6,7 +6,7 @@ from scenes import placed_at
 
 from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens
-from fisheye_geometry.remap import Turn
+from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.surface import surface_for
 from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.compose.gain import GainCompensation
@@ -28,9 +28,9 @@ UNSEEN_LEVELS = 0.5
 def pictures(left=1.0, right=1.0):
     """Photograph with different exposures, one number or one for each channel."""
     return [
-        np.minimum(Scene().view(LENS, Turn(yaw_rad=yaw)).frame(0) * np.asarray(gain), 255).astype(
-            np.uint8
-        )
+        np.minimum(
+            Scene().view(LENS, Attitude(yaw_rad=yaw)).frame(0) * np.asarray(gain), 255
+        ).astype(np.uint8)
         for yaw, gain in ((-YAW / 2, left), (YAW / 2, right))
     ]
 
@@ -117,7 +117,9 @@ def test_a_chain_of_cameras_is_evened_out_to_one():
     placed = placed_at(views, *offsets)
     layout = lay_out(placed, fade_px=8.0, crop='valid')
     images = [
-        (Scene().view(LENS, Turn(yaw_rad=np.radians(yaw))).frame(0) * exposure).astype(np.uint8)
+        (Scene().view(LENS, Attitude(yaw_rad=np.radians(yaw))).frame(0) * exposure).astype(
+            np.uint8
+        )
         for yaw, exposure in ((-120, 1.1), (0, 0.9), (120, 1.2))
     ]
     factors = GainCompensation(layout, placed, images).factors[:, 0]
@@ -130,7 +132,9 @@ def test_a_camera_that_shows_nothing_is_left_out():
     placed = placed_at(views, *offsets)
     layout = lay_out(placed, fade_px=8.0, crop='valid')
     left, middle = (
-        (Scene().view(LENS, Turn(yaw_rad=np.radians(yaw))).frame(0) * exposure).astype(np.uint8)
+        (Scene().view(LENS, Attitude(yaw_rad=np.radians(yaw))).frame(0) * exposure).astype(
+            np.uint8
+        )
         for yaw, exposure in ((-120, 1.1), (0, 0.9))
     )
     factors = GainCompensation(layout, placed, [left, middle, np.zeros_like(left)]).factors[:, 0]

@@ -21,7 +21,7 @@ from scenes import (
 )
 
 from fisheye_core.errors import OverlapError
-from fisheye_geometry.remap import LEVEL, Turn
+from fisheye_geometry.attitude import LEVEL, Attitude
 from fisheye_geometry.surface import SURFACES, Surface, surface_for
 from panorama_stitch.overlap.corrected_overlap import measure_corrected
 from panorama_stitch.overlap.methods import METHODS, CameraView, PairInput
@@ -111,7 +111,7 @@ def test_pictures_of_different_size_and_centre(town):
     assert overlap.offset_y_px == pytest.approx(y, abs=ONE_PX)
 
 
-@pytest.mark.parametrize('turn', [Turn(0, radians(1.5)), Turn(0, 0, radians(-1.5))])
+@pytest.mark.parametrize('turn', [Attitude(0, radians(1.5)), Attitude(0, 0, radians(-1.5))])
 def test_a_tilted_right_camera_is_measured(town, turn):
     (left, right), surfaces, true_px = town
     overlap = measure((left, tilted(right, surfaces[1], turn)), surfaces)
@@ -124,7 +124,7 @@ def test_a_tilted_right_camera_is_measured(town, turn):
 
 def test_tilt_is_left_alone_on_request(town):
     (left, right), surfaces, _ = town
-    right = tilted(right, surfaces[1], Turn(0, 0, radians(1)))
+    right = tilted(right, surfaces[1], Attitude(0, 0, radians(1)))
     overlap = measure((left, right), surfaces, correct_tilt=False)
     assert overlap.found
     assert overlap.attitude.is_pure_yaw

@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fisheye_core.errors import FileAccessError, OverlapFileError
-from fisheye_geometry.remap import Turn
+from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.surface import Surface
 from panorama_stitch.overlap.overlap_file import read_overlaps, write_overlaps
 from panorama_stitch.overlap.overlap_result import Overlap
@@ -24,7 +24,7 @@ FIRST = Overlap(
     True,
     545.02,
     -1.25,
-    Turn(radians(140.0), radians(1.0), radians(0.8)),
+    Attitude(radians(140.0), radians(1.0), radians(0.8)),
     116.98,
     0.8125,
     message='found',

@@ -10,8 +10,8 @@ import pytest
 from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens
 from fisheye_core.errors import GeometryError, OverlapError
+from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.image_circle import ImageCircle
-from fisheye_geometry.remap import Turn
 from panorama_stitch.pipeline.panorama_settings import PanoramaSettings
 from panorama_stitch.pipeline.rig_state import RigState
 
@@ -23,7 +23,7 @@ CLOSE_PX = 1.0
 
 @pytest.fixture(scope='module')
 def pictures():
-    return [Scene().view(LENS, Turn(yaw_rad=yaw)).frame(0) for yaw in (-YAW / 2, YAW / 2)]
+    return [Scene().view(LENS, Attitude(yaw_rad=yaw)).frame(0) for yaw in (-YAW / 2, YAW / 2)]
 
 
 def stitcher_of(lenses=(LENS, LENS), names=('left', 'right')):
@@ -43,7 +43,7 @@ def test_it_measures_the_offset_of_the_synthetic_rig(pictures):
 
 def test_cameras_of_different_focal_length_get_one(pictures):
     longer = replace(LENS, focal_x_px=LENS.focal_x_px * 1.02, focal_y_px=LENS.focal_y_px * 1.02)
-    right = Scene().view(longer, Turn(yaw_rad=YAW / 2)).frame(0)
+    right = Scene().view(longer, Attitude(yaw_rad=YAW / 2)).frame(0)
     stitcher = stitcher_of((LENS, longer))
     left_surface, right_surface = stitcher.surfaces
     assert left_surface.focal_px == right_surface.focal_px
@@ -104,7 +104,7 @@ def test_nothing_to_measure_on_is_said(pictures):
 
 def test_three_cameras():
     yaws = np.radians([-120, 0, 120])
-    pictures = [Scene().view(LENS, Turn(yaw_rad=yaw)).frame(0) for yaw in yaws]
+    pictures = [Scene().view(LENS, Attitude(yaw_rad=yaw)).frame(0) for yaw in yaws]
     stitcher = stitcher_of((LENS,) * 3, ('left', 'middle', 'right'))
     stitcher.overlaps = stitcher.measure([pictures], SETTINGS, 'correlation')
     expected = pytest.approx(np.radians(120) * LENS.focal_x_px, abs=CLOSE_PX)
@@ -119,7 +119,7 @@ def test_three_cameras():
 
 def test_a_dark_circle_is_no_part_of_the_panorama(pictures):
     circle = ImageCircle(LENS)
-    lit = Scene().view(LENS.with_max_angle(np.radians(80)), Turn(yaw_rad=-YAW / 2)).frame(0)
+    lit = Scene().view(LENS.with_max_angle(np.radians(80)), Attitude(yaw_rad=-YAW / 2)).frame(0)
     assert circle.look(lit)
     lens = LENS.with_max_angle(circle.angle_rad)
     assert SETTINGS.surface_of(lens).width < SETTINGS.surface_of(LENS).width
@@ -140,7 +140,7 @@ def test_jpeg_makes_no_tilt(pictures, quality):
 
 
 def test_a_small_tilt_is_measured():
-    turns = Turn(yaw_rad=-YAW / 2), Turn(YAW / 2, np.radians(0.3), np.radians(0.2))
+    turns = Attitude(yaw_rad=-YAW / 2), Attitude(YAW / 2, np.radians(0.3), np.radians(0.2))
     tilted = [Scene().view(LENS, turn).frame(0) for turn in turns]
     (overlap,) = stitcher_of().measure([tilted], SETTINGS, 'particles')
     assert np.degrees(overlap.attitude.pitch_rad) == pytest.approx(0.3, abs=0.1)

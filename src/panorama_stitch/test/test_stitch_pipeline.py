@@ -14,7 +14,8 @@ import pytest
 from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens
 from fisheye_core.errors import FileAccessError, ImageFormatError, OverlapError
-from fisheye_geometry.remap import RemapTable, Turn
+from fisheye_geometry.attitude import Attitude
+from fisheye_geometry.remap import RemapTable
 from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.pipeline.metrics import economy_sentence, metrics, unpaired_sentence
 from panorama_stitch.pipeline.panorama_settings import PanoramaSettings
@@ -31,7 +32,7 @@ TABLES = 3
 
 @pytest.fixture(scope='module')
 def pictures():
-    views = [Scene().view(LENS, Turn(yaw_rad=yaw)) for yaw in (-YAW / 2, YAW / 2)]
+    views = [Scene().view(LENS, Attitude(yaw_rad=yaw)) for yaw in (-YAW / 2, YAW / 2)]
     return dict(zip(('left', 'right'), (view.frame(0) for view in views), strict=True))
 
 

@@ -5,6 +5,5 @@
 anything), `layout` and `crop` (which columns are whose), `seam` (where neighbours agree best),
 `fade` and `blend` (how they meet there), `optical_flow` and `flow` (how near things meet, too),
 `gain` (how they become equally bright), `compositor` (all of it, frame after frame). `mask` tells
-where a camera sees the robot itself, `stale` marks cameras that went silent; `parallel` shares
-the rows between threads.
+where a camera sees the robot itself.
 """

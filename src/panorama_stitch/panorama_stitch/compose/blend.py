@@ -158,5 +158,5 @@ class _Level:
         self._room = np.empty_like(self.weight)
 
     def enlarged(self, coarse: '_Level') -> np.ndarray:
-        """Give the picture of the next coarser level in the size of this one."""
+        """Return the picture of the next coarser level in the size of this one."""
         return cv2.pyrUp(coarse.band, dst=self._room, dstsize=self._room.shape[1::-1])

@@ -16,7 +16,7 @@ from fisheye_capture.region import AnyFrame, region_named
 from fisheye_capture.source import shown_source
 from fisheye_core.errors import CameraFileError, FisheyeError
 from fisheye_geometry.camera import Camera
-from fisheye_geometry.image_circle import CircledLens
+from fisheye_geometry.image_circle import LensWithImageCircle
 from fisheye_geometry.lens import Lens
 from panorama_stitch.nodes.base_node import PanoramaBase
 from panorama_stitch.nodes.frame_reader import Reader, reader_for
@@ -40,7 +40,7 @@ class CameraInput:
             settings.surface_of(self.lens)
 
     def place(self, settings: PanoramaSettings) -> None:
-        """Tell the pipeline what the camera's images show, if it is known."""
+        """Place the camera in the pipeline, if what its images show is known."""
         if self.lens:
             surface = settings.surface_of(self.lens)
             self._node.pipeline.place(self._name, self.lens, surface, settings.interpolation)
@@ -56,7 +56,7 @@ class LocalCamera(CameraInput):
         is_topic = own.source == TOPIC
         self._raw = None if is_topic else ImagePublisher(node, f'{name}/image_raw')
         camera = self._calibration(reader)
-        self._camera, self._seen, self._fault = camera, CircledLens(camera.lens), ''
+        self._camera, self._seen, self._fault = camera, LensWithImageCircle(camera.lens), ''
         self._broken = DropCounter(node, f'a picture of {name}', f'{name} broken')
         self.place(node.settings)
         reader.add(name, self._take)

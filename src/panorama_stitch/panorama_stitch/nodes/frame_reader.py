@@ -104,7 +104,7 @@ class SourceReader(Reader):
 
 
 class TopicReader(Reader):
-    """Takes the pictures of a topic, once for all the cameras that are in them."""
+    """Reader of the images of a topic, once for all the cameras that are in them."""
 
     def __init__(self, node: PanoramaBase, topic: str, settings: CaptureSettings):
         super().__init__(settings)

@@ -52,7 +52,7 @@ class CorrectedCamera:
         )
 
     def _take_projection(self, message: Projection) -> None:
-        """Take the first projection at once, another one when an image of its size comes."""
+        """Use the first projection at once, another one when an image of its size comes."""
         try:
             surface = surface_of(message)
         except FisheyeError as error:

@@ -50,7 +50,7 @@ def refine(facing: FacingPair, start: Pose, tilt: bool) -> Pose:
 
 
 def _checked(facing, start, step, search_rad) -> Pose:
-    """Take a step from the start if it is one that a rig can need."""
+    """Accept a step from the start if it is one that a rig can need."""
     pose = start.moved(step)
     too_far = max(abs(step[:2])) > search_rad * facing.surface.focal_px
     too_steep = max(abs(pose.pitch_rad), abs(pose.roll_rad)) > _STEEPEST_RAD

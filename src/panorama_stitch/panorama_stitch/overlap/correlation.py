@@ -34,7 +34,7 @@ class ScoreMap:
     score: np.ndarray
 
     def peaks(self, count: int, apart_px: int) -> list[tuple[int, int]]:
-        """Give up to `count` offsets (x, y) with the highest scores above 0, highest first.
+        """Return up to `count` offsets (x, y) with the highest scores above 0, highest first.
 
         At the first and last `y` there is none: the score may go on rising beyond.
         """
@@ -50,7 +50,7 @@ class ScoreMap:
         return found
 
     def best_near(self, x: float, y: float, within_px: int) -> tuple[int, int]:
-        """Give the offset (x, y) with the highest score around one."""
+        """Return the offset (x, y) with the highest score around one."""
         rows, columns = (
             np.flatnonzero(np.abs(axis - np.clip(at, axis[0], axis[-1])) <= within_px)
             for axis, at in ((self.y[1:-1], y), (self.x, x))
@@ -65,7 +65,7 @@ class ScoreMap:
         return float(self.score[y - self.y[0], x - self.x[0]])
 
     def best_away_from(self, x: float, apart_px: float) -> tuple[float, float]:
-        """Give the highest score, and its x, of the offsets that are not near a column."""
+        """Return the highest score, and its x, of the offsets that are not near a column."""
         away = np.flatnonzero(np.abs(self.x - x) > apart_px)
         if not len(away):
             return 0.0, x

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from panorama_stitch.overlap.view import View
+from panorama_stitch.overlap.view import OverlapView
 
 _DENSITY = 260.0
 """Pixels per radian at the edge of the view; finer pictures tell no more."""
@@ -46,7 +46,7 @@ class Features:
         return self.frames[:, :, 0]
 
 
-def find_features(view: View, usable: np.ndarray) -> Features:
+def find_features(view: OverlapView, usable: np.ndarray) -> Features:
     """Find the features of a view where `usable` (height, width) uint8 is not 0."""
     focal, half = _scale(view)
     side = 2 * half + 1

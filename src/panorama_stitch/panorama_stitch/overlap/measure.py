@@ -21,7 +21,7 @@ from panorama_stitch.overlap.features import find_features
 from panorama_stitch.overlap.result import RotationResult
 from panorama_stitch.overlap.rotation import Proposal, propose_rotations
 from panorama_stitch.overlap.trial import DIM, SHARP, Stages, Trial, try_rotation
-from panorama_stitch.overlap.view import View
+from panorama_stitch.overlap.view import OverlapView
 
 MIN_CONFIDENCE = 0.7
 """Below it two views count as having no common scene."""
@@ -40,7 +40,7 @@ _LENS_RAD = radians(0.02)
 
 
 def measure_rotation(
-    pairs: Sequence[tuple[View, View]],
+    pairs: Sequence[tuple[OverlapView, OverlapView]],
     *,
     expected: Rotation | None = None,
     within_rad: float = pi,

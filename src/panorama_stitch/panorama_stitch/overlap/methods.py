@@ -21,7 +21,7 @@ from panorama_stitch.overlap.measure import measure_rotation
 from panorama_stitch.overlap.overlap_result import Overlap, side_by_side
 from panorama_stitch.overlap.overlap_settings import OverlapSettings
 from panorama_stitch.overlap.reported_particles import with_particles
-from panorama_stitch.overlap.view import View
+from panorama_stitch.overlap.view import OverlapView
 
 _UNKNOWN_TILT_RAD = radians(50.0)
 """Two cameras that each look up or down by 25 degrees differ by so much."""
@@ -102,7 +102,7 @@ def by_votes(pair: PairInput, settings: OverlapSettings) -> Overlap:
         return by_correlation(pair, settings)
     views = [
         tuple(
-            View(image, camera.source, camera.body)
+            OverlapView(image, camera.source, camera.body)
             for image, camera in zip(images, (pair.left, pair.right), strict=True)
         )
         for images in pair.images

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from panorama_stitch.overlap.parallax import fit_far, stepped
 from panorama_stitch.overlap.patches import cast_votes
 from panorama_stitch.overlap.strips import draw_strips, seam_frame
-from panorama_stitch.overlap.view import View
+from panorama_stitch.overlap.view import OverlapView
 from panorama_stitch.overlap.votes import Votes, pooled, thinned
 
 _DENSITY = 115.0
@@ -65,8 +65,8 @@ class SeamMonitor:
         self._votes: deque[Votes] = deque(maxlen=_MOMENTS)
         self._steps: deque[tuple[float, np.ndarray]] = deque(maxlen=_MOMENTS)
 
-    def look(self, left: View, right: View, stamp_s: float) -> SeamState:
-        """Take one more pair of frames into account.
+    def look(self, left: OverlapView, right: OverlapView, stamp_s: float) -> SeamState:
+        """Account for one more pair of frames.
 
         Parameters
         ----------

@@ -60,7 +60,7 @@ class Overlap:
 
 
 def yaw_between_rad(offset_x_px: float, left: Surface, right: Surface) -> float:
-    """Give the angle between the optical axes of two neighbours at an offset.
+    """Return the angle between the optical axes of two neighbours at an offset.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def yaw_between_rad(offset_x_px: float, left: Surface, right: Surface) -> float:
 
 
 def side_by_side(surface_left: Surface, method: str, message: str) -> Overlap:
-    """Give the overlap of views that share nothing: whole, one beside the other."""
+    """Return the overlap of views that share nothing: whole, one beside the other."""
     return Overlap(
         method=method,
         found=False,

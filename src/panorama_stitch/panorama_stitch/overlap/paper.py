@@ -56,7 +56,7 @@ def match_particles(left: Sequence[Particle], right: Sequence[Particle]) -> Part
 
 
 def offset_x(left_width: int, left: Particle, right: Particle) -> float:
-    """Give the column of the left frame at which the right frame goes, px.
+    """Return the column of the left frame at which the right frame goes, px.
 
     The average of the two centres of mass beside the part of the left frame that faces away.
     """

@@ -142,7 +142,7 @@ def measure(binary: np.ndarray, most: int | None = None) -> np.ndarray:
 
 
 def scaled(properties: np.ndarray, scale: float) -> np.ndarray:
-    """Give properties (n, 10) in px of a picture `scale` times as large."""
+    """Return properties (n, 10) in px of a picture `scale` times as large."""
     properties = properties * np.array([*[scale] * 8, scale * scale, 1.0])
     properties[:, :2] += (scale - 1) / 2  # integers are pixel centres
     return properties

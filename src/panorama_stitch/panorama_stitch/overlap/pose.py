@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fisheye_geometry.remap import Turn
+from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.surface import Surface
 
 _SMALL_RAD = 1e-3
@@ -21,21 +21,21 @@ class Pose:
     roll_rad: float = 0.0
 
     @property
-    def turn(self) -> Turn:
+    def turn(self) -> Attitude:
         """The right camera's turn, with which the offset is meant."""
-        return Turn(0.0, self.pitch_rad, self.roll_rad)
+        return Attitude(0.0, self.pitch_rad, self.roll_rad)
 
     def moved(self, step: np.ndarray) -> 'Pose':
-        """Give the pose after a step (4,) in x, y, pitch and roll."""
+        """Return the pose after a step (4,) in x, y, pitch and roll."""
         x, y, pitch, roll = map(float, step)
         return Pose(self.x_px + x, self.y_px + y, self.pitch_rad + pitch, self.roll_rad + roll)
 
     def scaled(self, factor: float) -> 'Pose':
-        """Give the same pose in pixels of another size."""
+        """Return the same pose in pixels of another size."""
         return Pose(self.x_px * factor, self.y_px * factor, self.pitch_rad, self.roll_rad)
 
     def place(self, surface: Surface, points: np.ndarray) -> np.ndarray:
-        """Tell where points of the right picture lie in the left one.
+        """Map points of the right image to the left one.
 
         Parameters
         ----------

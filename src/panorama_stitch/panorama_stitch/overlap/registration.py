@@ -132,7 +132,7 @@ def fit_at(
     surface_right: Surface,
     offset_x_px: float,
 ) -> float:
-    """Tell how well the right one of two grey pictures fits at an offset, 0 to 1."""
+    """Score how well the right one of two grey images fits at an offset, 0 to 1."""
     left, right = facing_halves(left, right)
     level_y_px = surface_left.center_y_px - surface_right.center_y_px
     facing = face(left, right, surface_right, level_y_px, _SEARCH_PX_PER_DEG)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from panorama_stitch.overlap.view import View
+from panorama_stitch.overlap.view import OverlapView
 
 _WIDEST_RAD = np.radians(36)
 """To either side of the seam; more of a wide overlap tells no more."""
@@ -67,7 +67,11 @@ def seam_rays(u_rad: np.ndarray, v_rad: np.ndarray) -> np.ndarray:
 
 
 def draw_strips(
-    left: View, right: View, rotation: np.ndarray, density: float, usable=(None, None)
+    left: OverlapView,
+    right: OverlapView,
+    rotation: np.ndarray,
+    density: float,
+    usable=(None, None),
 ) -> Strips | None:
     """Draw the overlap of two views; None where there is none.
 

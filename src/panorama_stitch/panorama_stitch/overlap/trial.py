@@ -9,7 +9,7 @@ import numpy as np
 from panorama_stitch.overlap.parallax import Fit, fit_far, stepped
 from panorama_stitch.overlap.patches import cast_votes
 from panorama_stitch.overlap.strips import draw_strips
-from panorama_stitch.overlap.view import View
+from panorama_stitch.overlap.view import OverlapView
 from panorama_stitch.overlap.votes import Votes, pooled
 
 
@@ -113,7 +113,7 @@ class Trial:
 
 
 def try_rotation(
-    pairs: Sequence[tuple[View, View]], usable, rotation: np.ndarray, reach: Reach
+    pairs: Sequence[tuple[OverlapView, OverlapView]], usable, rotation: np.ndarray, reach: Reach
 ) -> Trial | None:
     """Let the patches of the overlap vote on a rotation (3, 3), and correct it.
 

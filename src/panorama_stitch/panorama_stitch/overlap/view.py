@@ -16,7 +16,7 @@ _HOLE_PX = 7
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class OverlapView:
     """An image with its camera model.
 
     Attributes

@@ -67,7 +67,7 @@ class CompositorBuilder:
         *,
         is_live: bool,
     ) -> None:
-        """Take a frame set into account, and start what is due unless something is in work.
+        """Account for a frame set, and start what is due unless something is in work.
 
         Parameters
         ----------
@@ -87,7 +87,7 @@ class CompositorBuilder:
             self._job = self._background.do(self._prepare, frames, settings, is_live)
 
     def renew(self, *, forget: bool) -> None:
-        """Have a new compositor built soon; `forget` what the cameras showed so far."""
+        """Request a new compositor; `forget` what the cameras showed so far."""
         if forget:
             with self._lock:
                 self._recent.clear()

@@ -42,7 +42,7 @@ class FrameClock:
         self.jitter_ns = 0.0
 
     def tick(self, stamp_ns: int) -> float:
-        """Take the stamp of the next frame; return it without its jitter, ns."""
+        """Return the stamp of the next frame without its jitter, ns."""
         beats = self._beats_since_last(stamp_ns)
         if beats is None:
             self._stamps.clear()

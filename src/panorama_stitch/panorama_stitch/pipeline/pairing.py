@@ -108,7 +108,7 @@ class FramePairing:
             track.clear()
 
     def add(self, camera: str, stamp_ns: int, frame: Any) -> list[Stamped] | None:
-        """Take a frame; return the group that it completes, in the order of the cameras."""
+        """Add a frame; return the group that it completes, in the order of the cameras."""
         self._tracks[camera].add(Stamped(stamp_ns, frame))
         tracks = list(self._tracks.values())
         while all(track.waiting for track in tracks):

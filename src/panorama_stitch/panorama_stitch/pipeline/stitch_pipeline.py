@@ -151,7 +151,7 @@ class StitchPipeline:
         self._dimensions = 0
 
     def take(self, camera: str, stamp_ns: int, image: np.ndarray, encoding: str) -> None:
-        """Take a frame of a camera; nobody may write to it afterwards.
+        """Add a frame of a camera; nobody may write to it afterwards.
 
         The first one in colour decides the order of the panorama's channels.
 

@@ -5,7 +5,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from fisheye_geometry.lens import FisheyeLens
-from panorama_stitch.overlap.view import View
+from panorama_stitch.overlap.view import OverlapView
 
 WIDTH, HEIGHT = 320, 240
 LENS = FisheyeLens(
@@ -38,7 +38,9 @@ def rays(lens=LENS) -> tuple[np.ndarray, np.ndarray]:
     return lens.unproject(np.stack([x, y], axis=-1))
 
 
-def see(around, attitude: Rotation, origin=(0.0, 0.0, 0.0), post=None, lens=LENS, seed=0) -> View:
+def see(
+    around, attitude: Rotation, origin=(0.0, 0.0, 0.0), post=None, lens=LENS, seed=0
+) -> OverlapView:
     """Look at a world that is infinitely far, and at an upright post.
 
     Parameters
@@ -68,7 +70,7 @@ def see(around, attitude: Rotation, origin=(0.0, 0.0, 0.0), post=None, lens=LENS
         at = np.arctan2(x, z) - np.arctan2(dx, dz)
         light = np.where(np.abs(at) < miss, 100 + 60 * np.sign(np.sin(40 * y)), light)
     light = light + np.random.default_rng(seed).normal(0, 2, light.shape)
-    return View(np.where(lit, np.clip(light, 1, 255), 0).astype(np.uint8), lens)
+    return OverlapView(np.where(lit, np.clip(light, 1, 255), 0).astype(np.uint8), lens)
 
 
 def turned(*, yaw=0.0, pitch=0.0, roll=0.0) -> Rotation:

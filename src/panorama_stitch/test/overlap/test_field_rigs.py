@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from fisheye_geometry.camera_file import read_camera
 from panorama_stitch.overlap.measure import measure_rotation
-from panorama_stitch.overlap.view import View
+from panorama_stitch.overlap.view import OverlapView
 
 DATA = Path(os.environ.get('FISHEYE_DATA', ''))
 RIGHT_RAD = np.radians(0.5)
@@ -57,7 +57,7 @@ def folder(*parts):
 
 def view(path, camera):
     image = cv2.imread(str(path / f'{camera}.png'))
-    return View(image, read_camera(path / f'{camera}.yaml').lens)
+    return OverlapView(image, read_camera(path / f'{camera}.yaml').lens)
 
 
 @pytest.mark.parametrize('name', FIELD)

@@ -9,7 +9,7 @@ from seeing import LENS, apart_deg, see, turned, world
 from fisheye_geometry.remap import RemapTable
 from fisheye_geometry.surface import surface_for
 from panorama_stitch.overlap.measure import measure_rotation
-from panorama_stitch.overlap.view import View
+from panorama_stitch.overlap.view import OverlapView
 
 RIGHT_DEG = 0.5
 """What an operator sees as a step in the panorama."""
@@ -71,7 +71,7 @@ def test_what_stays_at_its_pixels_is_no_witness():
     y, x = np.indices(left.image.shape)
     body = (y > 150) & (left.image > 0)
     pattern = np.where((x + y) // 9 % 2, 220, 30).astype(np.uint8)
-    views = [View(np.where(body, pattern, one.image), LENS) for one in (left, right)]
+    views = [OverlapView(np.where(body, pattern, one.image), LENS) for one in (left, right)]
     result = measure_rotation([tuple(views)])
     assert result.found
     assert apart_deg(result.rotation, turned(yaw=YAW)) < RIGHT_DEG
@@ -81,7 +81,7 @@ def test_a_masked_part_is_not_looked_at():
     left, right = pair(turned(yaw=-YAW / 2), turned(yaw=YAW / 2))
     masked = np.zeros(left.image.shape, bool)
     masked[:, left.image.shape[1] // 3 :] = True
-    result = measure_rotation([(View(left.image, LENS, masked), right)])
+    result = measure_rotation([(OverlapView(left.image, LENS, masked), right)])
     assert not result.found
 
 
@@ -94,7 +94,7 @@ def test_two_places_have_no_common_scene():
 
 
 def test_a_blank_picture_has_nothing_in_common():
-    blank = View(np.full((240, 320), 90, np.uint8), LENS)
+    blank = OverlapView(np.full((240, 320), 90, np.uint8), LENS)
     result = measure_rotation([(blank, blank)])
     assert result.rotation is None or not result.found
     assert result.confidence < RIGHT_DEG
@@ -104,7 +104,7 @@ def test_corrected_pictures_are_a_source_like_raw_ones():
     views = pair(turned(yaw=-YAW / 2), turned(yaw=YAW / 2, pitch=5))
     surface = surface_for(LENS, 'cylindrical')
     table = RemapTable(LENS, surface)
-    corrected = tuple(View(table(view.image), surface) for view in views)
+    corrected = tuple(OverlapView(table(view.image), surface) for view in views)
     result = measure_rotation([corrected])
     assert apart_deg(result.rotation, turned(yaw=YAW) * turned(pitch=5)) < RIGHT_DEG
 
