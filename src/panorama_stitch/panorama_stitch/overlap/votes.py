@@ -50,7 +50,7 @@ def no_votes() -> Votes:
 
 
 def scaled(votes, area) -> Votes:
-    """Give every patch this area."""
+    """Set the area of every patch."""
     return replace(
         votes,
         weight=votes.weight * area,
