@@ -1,8 +1,10 @@
 """fisheye_msgs/Projection to surface and back."""
 
 from fisheye_msgs.msg import Projection
+from geometry_msgs.msg import Quaternion
 from std_msgs.msg import Header
 
+from fisheye_geometry.attitude import LEVEL, Attitude, quaternion
 from fisheye_geometry.surface import Surface
 
 
@@ -18,8 +20,11 @@ def surface_of(message: Projection) -> Surface:
     )
 
 
-def projection_of(surface: Surface, header: Header, *, wraps: bool = False) -> Projection:
-    """Describe a surface in a message."""
+def projection_of(
+    surface: Surface, header: Header, *, wraps: bool = False, orientation: Attitude = LEVEL
+) -> Projection:
+    """Describe a surface in a message; `orientation` is its attitude in the level frame."""
+    x, y, z, w = quaternion(orientation)
     return Projection(
         header=header,
         surface=surface.kind,
@@ -29,4 +34,5 @@ def projection_of(surface: Surface, header: Header, *, wraps: bool = False) -> P
         center_x_px=surface.center_x_px,
         center_y_px=surface.center_y_px,
         wraps=wraps,
+        orientation=Quaternion(x=x, y=y, z=z, w=w),
     )

@@ -21,7 +21,8 @@ class Correction:
     """
 
     def __init__(self, lens: Lens, settings: UndistortSettings):
-        self._table = RemapTable(lens, settings.surface_of(lens), settings.interpolation)
+        surface = settings.surface_of(lens)
+        self._table = RemapTable(lens, surface, settings.interpolation, settings.tilt)
         self.surface = self._table.surface
         self._grey_floor = self._table.valid.astype(np.uint8)
         self._color_floor = cv2.merge([self._grey_floor] * 3)

@@ -64,7 +64,9 @@ class UndistortNode(Node):
 
     def _build(self, lens, settings):
         self._correction = Correction(lens, settings)
-        self._projection.publish(projection_of(self._correction.surface, self._header))
+        self._projection.publish(
+            projection_of(self._correction.surface, self._header, orientation=settings.orientation)
+        )
 
     def _correct(self, image, encoding, header):
         correction = self._correction

@@ -1,9 +1,10 @@
 """Settings of the correction: the only place with their defaults."""
 
 from dataclasses import dataclass
-from math import radians
+from math import isnan, nan, radians
 
 from fisheye_core.settings import setting
+from fisheye_geometry.attitude import LEVEL, Attitude
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.remap import INTERPOLATIONS
 from fisheye_geometry.surface import SCALES, SURFACES, Surface, surface_for
@@ -54,7 +55,13 @@ class SurfaceSettings:
             vfov_rad=radians(self.vfov_deg),
             width=width,
             height=height,
+            attitude=self.tilt,
         )
+
+    @property
+    def tilt(self) -> Attitude:
+        """Attitude of the camera in the frame of its corrected picture."""
+        return LEVEL
 
     @property
     def _size(self) -> tuple[int, int]:
@@ -81,6 +88,46 @@ class UndistortSettings(SurfaceSettings):
         live=True,
     )
 
+    yaw_deg: float = setting(
+        nan,
+        'How far the camera is turned to the right; NaN: not known. It is told in projection.',
+        minimum=-360.0,
+        maximum=360.0,
+        nan=True,
+        live=True,
+    )
+    pitch_deg: float = setting(
+        nan,
+        'How far the camera is turned up, taken out of the corrected picture; NaN: not known.',
+        minimum=-90.0,
+        maximum=90.0,
+        nan=True,
+        live=True,
+    )
+    roll_deg: float = setting(
+        nan,
+        'How far the camera is turned clockwise as it sees it (upside down: 180), taken out of '
+        'the corrected picture; NaN: not known.',
+        minimum=-360.0,
+        maximum=360.0,
+        nan=True,
+        live=True,
+    )
+
+    @property
+    def tilt(self) -> Attitude:
+        """Attitude of the camera in the frame of its corrected picture, which is level."""
+        return Attitude(0.0, _known_rad(self.pitch_deg), _known_rad(self.roll_deg))
+
+    @property
+    def orientation(self) -> Attitude:
+        """Attitude of the corrected picture in the level frame in which the camera is mounted."""
+        return Attitude(_known_rad(self.yaw_deg))
+
     @property
     def _size(self) -> tuple[int, int]:
         return self.width, self.height
+
+
+def _known_rad(angle_deg: float) -> float:
+    return 0.0 if isnan(angle_deg) else radians(angle_deg)

@@ -1,6 +1,7 @@
 """The undistort node over real rclpy: corrected pictures, and nonsense kept away."""
 
 import time
+from math import radians
 
 import cv2
 import numpy as np
@@ -18,6 +19,7 @@ from fisheye_bridge.diagnostics import Report
 from fisheye_bridge.images import to_array
 from fisheye_bridge.projection import surface_of
 from fisheye_bridge.qos import IMAGE, LATCHED
+from fisheye_geometry.attitude import Attitude, quaternion
 from fisheye_geometry.camera_file import Camera
 from fisheye_geometry.lens import make_lens
 from fisheye_testing.image_message import to_message
@@ -110,6 +112,41 @@ def test_pictures_are_corrected_and_their_projection_is_told(make_bench):
     assert set(np.unique(picture)) == {0, 200}
     assert bench.pictures[-1].header.frame_id == 'left_optical_frame'
     assert bench.pictures[-1].header.stamp.nanosec > 0
+
+
+@pytest.mark.parametrize(
+    ('pitch_deg', 'roll_deg'), [(-20.0, 0.0), (0.0, 180.0), (-12.0, 90.0), (10.0, -7.0)]
+)
+def test_a_tilted_camera_is_corrected_level_and_its_yaw_is_told(make_bench, pitch_deg, roll_deg):
+    bench = make_bench(yaw_deg=30.0, pitch_deg=pitch_deg, roll_deg=roll_deg)
+    attitude = Attitude(radians(30), radians(pitch_deg), radians(roll_deg))
+    at_px = np.array([[95.0, 72.0], [68.0, 50.0]])
+    picture = np.full((LENS.height, LENS.width, 3), 100, np.uint8)
+    for x, y in at_px.astype(int):
+        cv2.circle(picture, (int(x), int(y)), 3, (255, 255, 255), -1)
+    bench.until(
+        lambda: bench.pictures and bench.projections, 'a corrected picture', picture=picture
+    )
+    projection = bench.projections[-1]
+    q = projection.orientation
+    assert (q.x, q.y, q.z, q.w) == pytest.approx(quaternion(Attitude(radians(30))))
+    level = LENS.unproject(at_px)[0] @ attitude.matrix.T
+    turned = level @ Attitude(radians(30)).matrix
+    corrected = to_array(bench.pictures[-1])[0]
+    for (x, y), seen in zip(*surface_of(projection).project(turned), strict=True):
+        assert seen
+        assert corrected[round(y), round(x), 0] > 200
+    lit = corrected[..., 0] > 0
+    assert lit.any(axis=1)[[0, -1]].all(), 'no more rows than the camera sees'
+
+
+def test_live_angles_are_taken(make_bench):
+    bench = make_bench()
+    bench.until(lambda: bench.projections, 'a projection')
+    level = surface_of(bench.projections[-1])
+    bench.node.set_parameters([Parameter('pitch_deg', value=-15.0)])
+    bench.until(lambda: surface_of(bench.projections[-1]) != level, 'a level surface')
+    assert surface_of(bench.projections[-1]).center_y_px < level.center_y_px
 
 
 def test_a_camera_that_publishes_best_effort_is_taken_as_such(make_bench):
