@@ -9,7 +9,7 @@ import sys
 
 import numpy as np
 from mounts import random_lens
-from scenes import Post, Scene
+from scenes import OverlapScene, Post
 from scipy.spatial.transform import Rotation
 from worlds import STYLES, random_world
 
@@ -68,7 +68,7 @@ def drive(seed: int, turn_deg: float) -> tuple[bool, float, float]:
             for px, pz, r in posts
             if pz - 0.5 * second > 0.5
         ]
-        scene = Scene(world, things)
+        scene = OverlapScene(world, things)
         attitudes = left, right * moved if second >= MOVED_AT_S else right
         views = [
             see(rng, scene, lens, attitude, np.array([side * baseline_m / 2, 0.0, 0.0]))

@@ -12,7 +12,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 from mounts import half_width_rad, random_attitudes, random_lenses
-from scenes import FAR, Scene, random_things
+from scenes import FAR, OverlapScene, random_things
 from scipy.spatial.transform import Rotation
 from worlds import STYLES, random_world
 
@@ -76,7 +76,7 @@ def random_rig(seed: int, *, common: bool = True, held_out: bool = False) -> Ran
     attitudes = random_attitudes(rng, 180.0, 0.1) if opposite else random_attitudes(rng, yaw_deg)
     baseline_m = rng.uniform(0.02, 0.3)
     place = np.array([baseline_m / 2, *(rng.normal(0, 0.05, 2) * baseline_m)])
-    scene, near_share = Scene(world), 0.0
+    scene, near_share = OverlapScene(world), 0.0
     if common and rng.random() < 0.4:
         scene, near_share = _with_near_things(rng, world, lenses, attitudes, place)
     exposure = np.exp(rng.uniform(np.log(0.25), np.log(4))) ** (rng.random() < 0.5)
@@ -86,7 +86,7 @@ def random_rig(seed: int, *, common: bool = True, held_out: bool = False) -> Ran
         lenses,
         attitudes,
         (-place, place),
-        (scene, scene if common else Scene(other)),
+        (scene, scene if common else OverlapScene(other)),
         (exposure**-0.5, exposure**0.5),
         strict=True,
     ):
@@ -186,13 +186,13 @@ def _with_near_things(rng, world, lenses, attitudes, place):
         inside &= (x >= 0) & (y >= 0) & (x < lens.width) & (y < lens.height)
         rays = rays[inside]
     for _ in range(50):
-        scene = Scene(world, tuple(random_things(rng, _texture)))
+        scene = OverlapScene(world, tuple(random_things(rng, _texture)))
         near = np.zeros(len(rays), bool)
         for origin in (-place, place):
             near |= scene.look(origin, rays, 10.0)[1] != FAR
         if NEAR_SHARE[0] < near.mean() < NEAR_SHARE[1]:
             return scene, float(near.mean())
-    return Scene(world), 0.0
+    return OverlapScene(world), 0.0
 
 
 def _expose(rng, light, lit, lens, gain, noise, blur_px):

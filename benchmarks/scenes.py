@@ -86,7 +86,7 @@ def _sampled(picture, x, y):
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class OverlapScene:
     """What is around a rig.
 
     Attributes

@@ -13,7 +13,7 @@ from fisheye_bridge.qos import HEARTBEAT
 WAIT_S = 20.0
 
 
-class Pair:
+class NodePair:
     """A node that listens, and another one that promises reports, or does not."""
 
     def __init__(self, qos):
@@ -47,7 +47,7 @@ class Pair:
 @pytest.fixture
 def pair(request):
     rclpy.init()
-    pair = Pair(getattr(request, 'param', HEARTBEAT))
+    pair = NodePair(getattr(request, 'param', HEARTBEAT))
     pair.spin_until(pair.is_seen)
     yield pair
     for node in (pair.listener, pair.other):

@@ -15,7 +15,7 @@ from fisheye_core.settings import rules, setting
 
 
 @dataclass(frozen=True)
-class Example:
+class NodeSettings:
     """One setting of each kind."""
 
     rate_hz: float = setting(30.0, 'Frames a second.', minimum=0.1, maximum=1000.0, live=True)
@@ -47,7 +47,7 @@ def make_node():
 
 def test_defaults_and_descriptors(make_node):
     node = make_node()
-    settings = Parameters(node, Example).settings
+    settings = Parameters(node, NodeSettings).settings
     assert (settings.rate_hz, settings.source, settings.blend) == (30.0, 'synthetic', 'feather')
     assert isnan(settings.offset_px[0])
     rate = node.describe_parameter('rate_hz')
@@ -58,7 +58,7 @@ def test_defaults_and_descriptors(make_node):
 
 
 def test_what_is_clear_is_taken(make_node):
-    settings = Parameters(make_node(rate_hz=15, source=0, offset_px=545), Example).settings
+    settings = Parameters(make_node(rate_hz=15, source=0, offset_px=545), NodeSettings).settings
     assert (settings.rate_hz, settings.source, settings.offset_px) == (15.0, '0', (545.0,))
 
 
@@ -73,7 +73,7 @@ def test_what_is_clear_is_taken(make_node):
 )
 def test_a_bad_start_is_refused_by_name(make_node, overrides, words):
     with pytest.raises(SettingError, match=words):
-        Parameters(make_node(**overrides), Example)
+        Parameters(make_node(**overrides), NodeSettings)
 
 
 def change(node, name, value):
@@ -82,7 +82,7 @@ def change(node, name, value):
 
 def test_live_changes_apply_and_bad_ones_do_not(make_node):
     node, seen = make_node(), []
-    parameters = Parameters(node, Example, on_change=lambda new: seen.append(new.blend))
+    parameters = Parameters(node, NodeSettings, on_change=lambda new: seen.append(new.blend))
     assert change(node, 'blend', 'none').successful
     assert parameters.settings.blend == 'none'
     for name, value, words in [
@@ -101,8 +101,8 @@ def test_live_changes_apply_and_bad_ones_do_not(make_node):
 
 def test_a_parameter_keeps_its_type(make_node):
     node = make_node(rate_hz=15, source=0, offset_px=545)
-    Parameters(node, Example, prefix='other.')
-    Parameters(node, Example)
+    Parameters(node, NodeSettings, prefix='other.')
+    Parameters(node, NodeSettings)
     kinds = {'rate_hz': Parameter.Type.DOUBLE, 'source': Parameter.Type.STRING}
     kinds['offset_px'] = Parameter.Type.DOUBLE_ARRAY
     assert {name: node.get_parameter(name).type_ for name in kinds} == kinds
@@ -117,8 +117,8 @@ def test_a_parameter_keeps_its_type(make_node):
 
 def test_what_was_dumped_can_be_loaded(make_node):
     node = make_node()
-    parameters = Parameters(node, Example)
-    for name, (_, default, rule) in rules(Example).items():
+    parameters = Parameters(node, NodeSettings)
+    for name, (_, default, rule) in rules(NodeSettings).items():
         if rule.live:
             value = list(default) if isinstance(default, tuple) else default
             # `ros2 param dump` writes YAML, `load` reads it and hands on its words as YAML again.
@@ -130,7 +130,7 @@ def test_what_was_dumped_can_be_loaded(make_node):
 
 def test_a_list_of_nothing_is_refused(make_node):
     node = make_node()
-    Parameters(node, Example)
+    Parameters(node, NodeSettings)
     result = change(node, 'offset_px', [])
     assert (result.successful, result.reason) == (
         False,
@@ -144,15 +144,15 @@ def test_the_node_may_refuse_with_a_sentence(make_node):
         raise OverlapError('that does not fit')
 
     node = make_node()
-    parameters = Parameters(node, Example, on_change=refuse)
+    parameters = Parameters(node, NodeSettings, on_change=refuse)
     assert change(node, 'blend', 'none').reason == 'that does not fit'
     assert parameters.settings.blend == 'feather'
 
 
 def test_prefixes_keep_two_sets_apart(make_node):
     node = make_node(**{'left.source': 'a.png'})
-    left = Parameters(node, Example, prefix='left.')
-    right = Parameters(node, Example, prefix='right.', rate_hz=10.0)
+    left = Parameters(node, NodeSettings, prefix='left.')
+    right = Parameters(node, NodeSettings, prefix='right.', rate_hz=10.0)
     assert (left.settings.source, right.settings.source) == ('a.png', 'synthetic')
     assert right.settings.rate_hz == 10.0
     assert change(node, 'left.blend', 'none').successful
@@ -170,8 +170,8 @@ def test_what_nobody_declared_is_named(make_node):
             'qos_overrides./parameter_events.publisher.depth': 5,
         }
     )
-    Parameters(node, Example, prefix='left.')
-    Parameters(node, Example, prefix='right.')
+    Parameters(node, NodeSettings, prefix='left.')
+    Parameters(node, NodeSettings, prefix='right.')
     assert misspelt(node) == (
         'there is no parameter left.sources (is left.source meant?), '
         'source (is left.source or right.source meant?), xyz'

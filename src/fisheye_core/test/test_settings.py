@@ -10,7 +10,7 @@ from fisheye_core.settings import convert, describe_range, rules, setting
 
 
 @dataclass(frozen=True)
-class Example:
+class SampleSettings:
     """One setting of each type."""
 
     rate_hz: float = setting(30.0, 'rate', minimum=0.1, maximum=1000.0)
@@ -22,7 +22,7 @@ class Example:
 
 
 def given(name, value):
-    kind, _, rule = rules(Example)[name]
+    kind, _, rule = rules(SampleSettings)[name]
     return convert(name, value, kind, rule)
 
 
@@ -71,7 +71,7 @@ def test_anything_else_is_refused_by_name(name, value, words):
 
 
 def test_ranges_in_words():
-    words = {name: describe_range(rule) for name, (_, _, rule) in rules(Example).items()}
+    words = {name: describe_range(rule) for name, (_, _, rule) in rules(SampleSettings).items()}
     assert words == {
         'rate_hz': '0.1 to 1000',
         'count': 'at least 0',

@@ -9,7 +9,7 @@ from panorama_stitch.pipeline.economy import Economy
 INTERVAL_S = 1 / 30
 
 
-class Machine:
+class BusyMachine:
     """Makes panoramas at 30 Hz, each of which costs so much time in full, and in economy."""
 
     def __init__(self):
@@ -32,7 +32,7 @@ class Machine:
 
 @pytest.fixture
 def machine():
-    return Machine()
+    return BusyMachine()
 
 
 def test_a_machine_with_time_never_saves(machine):
