@@ -249,7 +249,7 @@ def test_a_compressed_bayer_pattern_needs_whole_blocks():
 def test_broken_jpeg_is_refused(data):
     message = CompressedImage(format='jpeg')
     message.data.frombytes(data)
-    with pytest.raises(ImageFormatError, match=f'{len(data)} bytes are no picture'):
+    with pytest.raises(ImageFormatError, match=f'{len(data)} bytes are not an image'):
         from_jpeg(message)
 
 

@@ -75,7 +75,7 @@ class DeviceSource(Source):
             raise SourceLostError(f'{path} may not be opened; is the user in the group video?')
         device = Path(path).stat()
         if stat.S_ISCHR(device.st_mode) and os.major(device.st_rdev) != _VIDEO4LINUX:
-            raise SourceError(f'{path} is no camera; expected a Video4Linux device')
+            raise SourceError(f'{path} is not a camera; expected a Video4Linux device')
         capture = cv2.VideoCapture(path, cv2.CAP_V4L2)
         if not capture.isOpened():
             raise SourceLostError(f'{path} cannot be opened; is it a camera, and free?')
@@ -96,7 +96,7 @@ class DeviceSource(Source):
                 self._size = frame.size
                 return frame
             self.damaged += 1
-        raise SourceLostError(f'{self._name} gives only broken pictures')
+        raise SourceLostError(f'{self._name} sends only broken pictures')
 
     def close(self) -> None:
         """Release the camera."""
@@ -156,5 +156,5 @@ class DeviceSource(Source):
             now_s = time.monotonic()
             # A failure without a wait is no slow camera but a lost one.
             if now_s - began_s < _SELECT_TIMEOUT_S / 2 or now_s > deadline_s:
-                raise SourceLostError(f'{self._name} gives no more pictures')
+                raise SourceLostError(f'{self._name} stopped sending pictures')
         raise SourceEndedError('the source was closed')

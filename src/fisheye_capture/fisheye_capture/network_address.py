@@ -75,16 +75,16 @@ def refusal(request: StreamRequest, error: Exception) -> str:
     shown = request.shown
     kinds = {
         av.error.HTTPUnauthorizedError: 'refuses the user or password (401)',
-        av.error.HTTPForbiddenError: 'forbids this user to look (403)',
+        av.error.HTTPForbiddenError: 'denies this user access (403)',
         av.error.HTTPNotFoundError: 'has no such path (404); expected the address of its stream',
         av.error.HTTPClientError: 'refuses the request (4xx); is the path right?',
-        av.error.HTTPServerError: 'fails itself (5xx); does it have too many viewers?',
+        av.error.HTTPServerError: 'reports an error of its own (5xx); are there too many viewers?',
         av.error.ConnectionRefusedError: 'refuses the connection; is the port right, and the '
         'camera ready?',
         av.error.ExitError: f'gave no picture data within {request.connect_timeout_s:g} s; is it '
         'on, and the address right?',
-        av.error.InvalidDataError: 'answers with something that is no video; is it the address of '
-        'its stream?',
+        av.error.InvalidDataError: 'answers with something that is not a video; is it the '
+        'address of its stream?',
     }
     kinds[av.error.TimeoutError] = kinds[av.error.ExitError]
     for kind, reason in kinds.items():

@@ -48,7 +48,7 @@ def open_source(settings: CaptureSettings) -> Source:
 
 def _open_files(settings: CaptureSettings, name: str) -> Source:
     if os.path.exists(name) and not os.path.isfile(name) and not os.path.isdir(name):
-        raise SourceError(f'{name} is no regular file; expected a picture, a video or a folder')
+        raise SourceError(f'{name} is not a regular file; expected a picture, a video or a folder')
     if os.path.isfile(name):
         if is_picture(name):
             return PictureSource(settings, Path(name))

@@ -67,7 +67,7 @@ class StreamSource(Source):
                 check_size(self._name, self._size, frame.size)
                 self._size = frame.size
                 return frame
-        raise SourceLostError(f'{self._name} gives only broken pictures')
+        raise SourceLostError(f'{self._name} sends only broken pictures')
 
     def interrupt(self) -> None:
         """End the process, and with it a read that waits."""

@@ -98,7 +98,7 @@ class StreamCamera:
         silence_s = max(request.silence_timeout_s, _SLOW_PERIODS / request.frame_rate_hz)
         if now_s - self._heard_s > silence_s:
             raise StreamError(
-                f'{request.shown} gives no more pictures: nothing came for {silence_s:g} s'
+                f'{request.shown} stopped sending pictures: nothing came for {silence_s:g} s'
             )
         waited_s = now_s - self._seen_s
         if waited_s < _KEYFRAME_S or waited_s < silence_s:
@@ -113,7 +113,7 @@ class StreamCamera:
     def _run(self, work):
         try:
             work()
-            reason = f'{self._request.shown} gives no more pictures: it ended the stream'
+            reason = f'{self._request.shown} stopped sending pictures: it ended the stream'
         except StreamError as error:
             reason = str(error)
         except (av.error.FFmpegError, OSError) as error:

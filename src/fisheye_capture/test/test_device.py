@@ -130,7 +130,7 @@ def test_a_broken_picture_is_skipped_and_counted(open_device, broken):
 
 def test_only_broken_pictures_are_a_lost_camera(open_device):
     device = open_device(Capture(itertools.repeat((True, None))))
-    with pytest.raises(SourceLostError, match='video0 gives only broken pictures'):
+    with pytest.raises(SourceLostError, match='video0 sends only broken pictures'):
         device.read()
 
 
@@ -141,7 +141,7 @@ def test_what_the_camera_needs_is_taken_off_the_stamp(open_device):
 
 
 def test_a_device_that_is_no_camera_is_named(settings):
-    with pytest.raises(SourceError, match='/dev/zero is no camera; expected a Video4Linux'):
+    with pytest.raises(SourceError, match='/dev/zero is not a camera; expected a Video4Linux'):
         DeviceSource(settings('/dev/zero'))
 
 
@@ -157,7 +157,7 @@ def test_a_device_that_is_unplugged_is_lost_at_once(open_device):
     capture = Capture([GOOD])
     device = open_device(capture)
     device.read()
-    with pytest.raises(SourceLostError, match='gives no more pictures'):
+    with pytest.raises(SourceLostError, match='stopped sending pictures'):
         device.read()
     device.close()
     assert capture.is_released

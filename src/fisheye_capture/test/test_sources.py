@@ -95,13 +95,13 @@ def test_what_never_ends_is_named(settings, tmp_path, name):
         path.symlink_to('/dev/zero')
     else:
         os.mkfifo(path)
-    with pytest.raises(SourceError, match=f'{name} is no regular file; expected a picture'):
+    with pytest.raises(SourceError, match=f'{name} is not a regular file; expected a picture'):
         open_source(settings(path))
 
 
 def test_a_fifo_in_a_folder_is_named(settings, tmp_path):
     os.mkfifo(tmp_path / 'a.png')
-    with pytest.raises(SourceError, match=r'a\.png is no regular file'):
+    with pytest.raises(SourceError, match=r'a\.png is not a regular file'):
         open_source(settings(tmp_path))
 
 

@@ -48,7 +48,7 @@ def size_of(coded: np.ndarray) -> tuple[int, int]:
                 return _number(data[at + 7 : at + 9]), _number(data[at + 5 : at + 7])
             else:
                 at += 2 + _number(data[at + 2 : at + 4])
-    raise ImageFormatError(f'{len(data)} bytes are no picture; expected JPEG or PNG')
+    raise ImageFormatError(f'{len(data)} bytes are not an image; expected JPEG or PNG')
 
 
 def whole_jpeg(coded: np.ndarray) -> np.ndarray | None:

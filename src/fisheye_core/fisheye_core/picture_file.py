@@ -87,7 +87,7 @@ def _content(path: str | Path) -> bytes:
     with os.fdopen(file, 'rb') as opened:
         status = os.fstat(file)
         if not stat.S_ISREG(status.st_mode):
-            raise SourceError(f'{path} is no regular file; expected a picture')
+            raise SourceError(f'{path} is not a regular file; expected a picture')
         if status.st_size > _MAX_BYTES:
             raise SourceError(
                 f'{path} has {status.st_size / 1e6:.0f} MB; expected a picture of up to '

@@ -125,7 +125,7 @@ class _Builder:
         if isinstance(event, yaml.AliasEvent):
             if event.anchor not in self._anchors:
                 raise FileContentError(
-                    f'line {line}: it refers to `&{event.anchor:.40}`, which stands nowhere before'
+                    f'line {line}: it refers to `&{event.anchor:.40}`, which is not defined before'
                 )
             value, count = self._anchors[event.anchor]
             self._count(count, line)
@@ -157,7 +157,7 @@ class _Builder:
         while not isinstance(event := self._events.get_event(), yaml.MappingEndEvent):
             line = event.start_mark.line + 1
             if not isinstance(event, yaml.ScalarEvent):
-                raise FileContentError(f'line {line}: a key is no plain text')
+                raise FileContentError(f'line {line}: a key is not plain text')
             _refuse_tag(event)
             key = _text(event.value)
             mapping.lines[key] = line

@@ -41,7 +41,7 @@ def read_regular(path: str | Path, max_bytes: int) -> bytes:
     Raises
     ------
     OSError
-        If it cannot be read or is no regular file; its `strerror` says why.
+        If it cannot be read or is not a regular file; its `strerror` says why.
     """
     # Opening a FIFO would otherwise wait for somebody who writes.
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)

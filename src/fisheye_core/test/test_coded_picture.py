@@ -31,7 +31,9 @@ def test_bytes_that_fill_up_are_skipped():
 def test_what_ends_too_early_or_is_something_else_is_refused(suffix):
     coded = cv2.imencode(suffix, PICTURE)[1]
     for count in range(0, 24):
-        with pytest.raises(ImageFormatError, match=f'{count} bytes are no picture; expected JPEG'):
+        with pytest.raises(
+            ImageFormatError, match=f'{count} bytes are not an image; expected JPEG'
+        ):
             size_of(coded[:count])
 
 

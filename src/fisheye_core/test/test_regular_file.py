@@ -14,7 +14,7 @@ from fisheye_core.yaml_file import read_mapping, write_mapping
 
 @pytest.fixture
 def odd(tmp_path):
-    """Make what is no regular file, by its name in a sentence."""
+    """Make what is not a regular file, by its name in a sentence."""
     os.mkfifo(tmp_path / 'fifo')
     (tmp_path / 'folder').mkdir()
     return {

@@ -71,4 +71,4 @@ def _number(word: str, line: int) -> float:
     try:
         return float(word)
     except ValueError as error:
-        raise CameraFileError(f"line {line}: '{word:.40}' is no number") from error
+        raise CameraFileError(f"line {line}: '{word:.40}' is not a number") from error

@@ -253,7 +253,7 @@ def test_an_ini_file(tmp_path, name):
         ('-0.01\n', '\n', 'line 18: distortion has 4 numbers; in an INI file 5 mean plumb_bob'),
         ('640', 'wide 640', 'image_width is None; expected'),
         ('0 0 1\n\ndist', '0 0\n\ndist', 'line 13: camera_matrix has 8 numbers; expected 9'),
-        ('600.25', '6OO', "line 15: '6OO' is no number"),
+        ('600.25', '6OO', "line 15: '6OO' is not a number"),
         ('319.5 0\n', 'nan 0\n', 'holds nan; expected finite numbers'),
     ],
 )

@@ -39,7 +39,7 @@ def _parser() -> _Parser:
     parser = _Parser(
         prog='calibrate_lens',
         description=__doc__,
-        epilog='Exit code: 0 good, 2 poor but written, 1 failed: a sentence says why.',
+        epilog='Exit code: 0 good, 2 poor but written, 1 failed (with the reason).',
     )
     add = parser.add_argument
     add('pictures', nargs='*', help='pictures, folders, globs, videos')

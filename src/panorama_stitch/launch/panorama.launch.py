@@ -38,7 +38,7 @@ ARGUMENTS = {
     'host': ('', 'address on which browsers are served; 0.0.0.0 for other machines too'),
     'transforms': ('false', 'also publish where the optical frames of the cameras point'),
     'yaw_deg': ('', 'angle between the cameras; from overlap_file if it is not given'),
-    'use_sim_time': ('false', 'go by /clock, as a recording that is played gives it'),
+    'use_sim_time': ('false', 'go by /clock, as a recording that is played back provides it'),
 }
 OF_CAMERA = {
     'source': 'what the camera is: device, picture, folder, video or URL',
@@ -104,7 +104,7 @@ def checked(arguments, cameras):
     flags = {name: flag(name, arguments[name]) for name in FLAGS}
     paths = {name: os.path.expanduser(arguments[name]) for name in ('params_file', 'overlap_file')}
     if not Path(paths['params_file']).is_file():
-        raise RuntimeError(f"params_file is '{paths['params_file']}', which is no file")
+        raise RuntimeError(f"params_file is '{paths['params_file']}', which is not a file")
     rate = arguments['frame_rate_hz']
     rates = {'frame_rate_hz': number('frame_rate_hz', rate)} if rate else {}
     # Those of cameras that are not declared are there only if they were given.

@@ -151,7 +151,7 @@ def test_only_the_panorama_node_takes_topics(rig):
 
 def test_the_file_of_parameters_must_be_there(rig, tmp_path):
     path = tmp_path / 'rig.yaml'
-    with pytest.raises(RuntimeError, match=r"params_file is '.*rig.yaml', which is no file"):
+    with pytest.raises(RuntimeError, match=r"params_file is '.*rig.yaml', which is not a file"):
         rig.start(params_file=str(path))
     path.touch()
     nodes, _ = rig.start(params_file=str(path))

@@ -34,7 +34,7 @@ class ViewerSettings:
     )
     stale_after_s: float = setting(
         1.0,
-        'A picture that is older is shown to nobody new, and the page says that none comes.',
+        'An older image is not shown to new browsers, and the page reports that none arrives.',
         minimum=0.1,
         maximum=60.0,
     )

@@ -58,7 +58,7 @@ class SnapshotNode(Node):
 def seconds(text: str) -> float:
     """Read a time of the command line."""
     if not 0 <= (value := float(text)) < inf:
-        raise argparse.ArgumentTypeError(f'{text} is no time; expected seconds from 0')
+        raise argparse.ArgumentTypeError(f'{text} is not a time; expected seconds from 0')
     return value
 
 

@@ -70,8 +70,8 @@ def test_the_command_says_that_no_panorama_came(monkeypatch, capsys):
 @pytest.mark.parametrize(
     ('words', 'said'),
     [
-        (['--timeout', 'nan'], 'nan is no time; expected seconds from 0'),
-        (['--timeout=-1'], '-1 is no time; expected seconds from 0'),
+        (['--timeout', 'nan'], 'nan is not a time; expected seconds from 0'),
+        (['--timeout=-1'], '-1 is not a time; expected seconds from 0'),
         (['--ros-args', '-p', 'x'], "Couldn't parse parameter override rule: '-p x'"),
         (['--ros-args', '-r', '__ns:=bad-ns'], "Couldn't parse remap rule: '-r __ns:=bad-ns'"),
     ],

@@ -70,14 +70,14 @@ class PanoramaOutputSettings(OverlapSettings):
     )
     pair_by: str = setting(
         'stamp',
-        'What says which frames belong together: their stamps, or when they arrive, for cameras '
+        'How frames are matched: by their stamps, or by when they arrive, for cameras '
         'whose clocks differ.',
         choices=('stamp', 'arrival'),
         live=True,
     )
     max_pair_skew_s: float = setting(
         0.1,
-        'Frames whose stamps differ by more are no pair.',
+        'Frames whose stamps differ by more do not form a pair.',
         minimum=0.0,
         maximum=10.0,
         live=True,
