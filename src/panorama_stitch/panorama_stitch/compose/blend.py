@@ -49,6 +49,21 @@ class Blend(Protocol):
         """
 
 
+class BlendKind(Protocol):
+    """Class of a blend, called with where each view shows anything and the seam's columns."""
+
+    needs_overlap: bool
+
+    def __call__(
+        self,
+        left_seen: np.ndarray,
+        right_seen: np.ndarray,
+        seam: tuple[int, int] | None = None,
+        /,
+    ) -> Blend:
+        """Prepare the blend of a seam."""
+
+
 class Feather:
     """Fades from the left view into the right one."""
 

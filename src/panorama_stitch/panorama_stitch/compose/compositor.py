@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from fisheye_core.parallel import run_parallel
-from panorama_stitch.compose.blend import Feather, Multiband
+from panorama_stitch.compose.blend import BlendKind, Feather, Multiband
 from panorama_stitch.compose.fade import Fade
 from panorama_stitch.compose.flow import Flow
 from panorama_stitch.compose.gain import GainCompensation
@@ -17,7 +17,12 @@ from panorama_stitch.compose.layout import Layout, neighbours, wrapped
 from panorama_stitch.compose.placing import Placed, PlacedView
 from panorama_stitch.compose.view import Cut
 
-_BLENDS = {'none': Feather, 'feather': Feather, 'multiband': Multiband, 'flow': Flow}
+_BLENDS: dict[str, BlendKind] = {
+    'none': Feather,
+    'feather': Feather,
+    'multiband': Multiband,
+    'flow': Flow,
+}
 BLENDS = {'none': 0.0, 'feather': 1.0, 'multiband': 4.0, 'flow': 1.0}
 """The ways to blend, and the width of the fade of each in units of `feather_deg`."""
 _ALL_ROWS = slice(None)
@@ -181,7 +186,7 @@ class Compositor:
 class _Part(NamedTuple):
     """Where one thread draws how much of a view, and which seam it begins and ends there."""
 
-    index: int
+    camera: int
     rows: slice
     columns: slice
     cut: Cut | None

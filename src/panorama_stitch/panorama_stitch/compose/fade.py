@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from panorama_stitch.compose.blend import Blend
+from panorama_stitch.compose.blend import Blend, BlendKind
 from panorama_stitch.compose.layout import Layout, Seam, shared, wrapped
 from panorama_stitch.compose.placing import PlacedView
 
@@ -25,7 +25,7 @@ class Fade:
         layout: Layout,
         seam: Seam,
         pair: tuple[PlacedView, PlacedView, int],
-        blend: type[Blend],
+        blend: BlendKind,
     ):
         self.begin, self.end = _strip(layout, seam, pair, blend.needs_overlap)
         self._pieces = _pieces(self.begin, self.end, layout.surface.width)
@@ -33,8 +33,8 @@ class Fade:
         self._right = np.empty(0, np.uint8)
         self._blend: Blend | None = None
         if self.end > self.begin:
-            seen = _seen(layout, (self.begin, self.end), pair)
-            self._blend = blend(*seen, (seam.begin - self.begin, seam.end - self.begin))
+            left, right = _seen(layout, (self.begin, self.end), pair)
+            self._blend = blend(left, right, (seam.begin - self.begin, seam.end - self.begin))
 
     @property
     def columns(self) -> tuple[int, int]:

@@ -169,7 +169,9 @@ class _Warp:
         self._at, self._moved = np.empty_like(flow.grid), np.empty_like(flow.grid)
         height, width = shape
         inner_height, inner_width = flow.grid[flow.inner].shape[:2]
-        self._scale = self._back * np.float32([width / inner_width, height / inner_height])
+        self._scale = self._back * np.array(
+            [width / inner_width, height / inner_height], np.float32
+        )
         sides = np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32)
         self._grid = np.dstack(np.meshgrid(*sides))
         self._map = np.empty_like(self._grid)

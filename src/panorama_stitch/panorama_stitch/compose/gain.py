@@ -113,8 +113,8 @@ def _solution(pairs: Sequence[tuple[int, int]], weights: Sequence[float], camera
     for row, (left, right) in zip(steps, pairs, strict=True):
         row[right] += 1
         row[left] -= 1
-    weights = np.asarray(weights)
-    return np.linalg.pinv(steps * weights[:, None]) * weights
+    weight = np.asarray(weights)
+    return np.linalg.pinv(steps * weight[:, None]) * weight
 
 
 class _Pair:

@@ -81,7 +81,7 @@ def views_at_overlaps(views: Sequence[View], overlaps: Sequence[Overlap]) -> lis
         replace(
             view,
             attitude=replace(turn, yaw_rad=yaw - yaws[-1] / 2),
-            shift_px=tuple(map(float, shift - middle)),
+            shift_px=(float(shift[0] - middle[0]), float(shift[1] - middle[1])),
         )
         for view, turn, yaw, shift in zip(views, turns, yaws, shifts, strict=True)
     ]

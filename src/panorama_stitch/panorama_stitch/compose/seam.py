@@ -48,22 +48,25 @@ def _settled(layout: Layout, left: PlacedView, right: PlacedView, turn_px: int, 
         return seam
     rows = slice(y, y + surface.height)
     seen = np.ones((surface.height, end - begin), bool)
-    pictures, shows = [], []
+    pictures: list[np.ndarray] = []
+    shows: list[np.ndarray] = []
     for view, moved in ((left, 0), (right, turn_px)):
         columns = slice(begin - moved, end - moved)
         shows.append(view.shows(rows, columns))
         seen &= shows[-1] & ~view.shows_body(rows, columns)
-        picture = view.cut(rows, columns)(group[view.index])
+        picture: np.ndarray = view.cut(rows, columns)(group[view.index])
         pictures.append(
             picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
         )
     shown = _over(width, seen.mean(axis=0))
-    difference = _over(width, _difference(*pictures, seen)) / np.maximum(shown, 1e-3)
+    difference = _over(width, _difference(pictures[0], pictures[1], seen)) / np.maximum(
+        shown, 1e-3
+    )
     starts = begin - x + np.arange(len(shown))
     off_middle = (starts - seam.begin) / ((end - begin) / 2)
     price = (difference + _NOISE) * (1 + off_middle**2)
     price[shown < _SHOWN_SHARE * shown[np.abs(off_middle).argmin()]] = np.inf
-    holes = _holes(*shows, width)
+    holes = _holes(shows[0], shows[1], width)
     price[holes > holes[np.abs(off_middle).argmin()]] = np.inf
     best = int(starts[price.argmin()])
     return Seam(best, best + width)

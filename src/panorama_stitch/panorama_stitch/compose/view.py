@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import pi
+from typing import Any
 
 import numpy as np
 
@@ -12,8 +13,8 @@ from fisheye_geometry.lens import Lens
 from fisheye_geometry.remap import RemapTable, remap_table
 from fisheye_geometry.surface import Surface
 
-Cut = Callable[[np.ndarray, np.ndarray], object]
-"""Draws a part of a panorama: takes the camera's picture and the array to draw into."""
+Cut = Callable[..., Any]
+"""Draws a part of a panorama: takes the camera's image and, if given, the array for it."""
 _STEEP_RAD = np.radians(60)
 """A camera that looks up or down by more has no sides."""
 _SAME_FOCAL_PX = 1e-6
@@ -156,7 +157,7 @@ def shown(seen: np.ndarray, cut: Cut, shape: tuple[int, int]) -> np.ndarray:
 class Copy:
     """Draws a rectangle of a corrected picture; what lies outside of it is 0."""
 
-    def __init__(self, x_px: int, y_px: int, size: tuple[int, int], source: Surface):
+    def __init__(self, x_px: int, y_px: int, size: tuple[int, int], source: Lens | Surface):
         width, height = size
         left, top = min(max(0, -x_px), width), min(max(0, -y_px), height)
         right = max(left, min(width, source.width - x_px))
