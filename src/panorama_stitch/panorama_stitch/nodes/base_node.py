@@ -190,6 +190,7 @@ class PanoramaBase(Node):
         pipeline = self.pipeline
         if pipeline.compositor is not None:
             yield from pipeline.rig_faults
+        yield from pipeline.watch.complaints()
         for camera, fault in pipeline.rig.faults.items():
             yield f'{camera}: {fault}'
         if self.settings.level == 'imu' and self._imu_s is None:

@@ -77,11 +77,12 @@ class SeamMonitor:
         """
         strips = draw_strips(left, right, self._rotation, _DENSITY)
         votes = cast_votes(strips, _ALONG_RAD, _ACROSS_RAD) if strips else None
+        votes = thinned(votes, _VOTES) if votes else None
         fit = fit_far(votes, scan=True) if votes else None
         if fit is None:
             return SeamState(0.0, self._drift(stamp_s)[0], False)
         if votes.weight[fit.far].sum() >= _LEAST_FAR:
-            self._votes.append(thinned(votes, _VOTES))
+            self._votes.append(votes)
             self._steps.append((stamp_s, fit.step))
         miss = np.linalg.norm(votes.left - votes.right, axis=1)
         quality = votes.weight[miss < _AGREES_RAD].sum() / max(votes.weight.sum(), 1e-9)

@@ -18,6 +18,7 @@ from panorama_stitch.overlap.overlap_file import read_overlaps, write_overlaps
 from panorama_stitch.overlap.overlap_result import Overlap, side_by_side
 from panorama_stitch.pipeline.panorama_settings import PanoramaOutputSettings
 from panorama_stitch.pipeline.rig_state import RigState
+from panorama_stitch.pipeline.seam_watch import SeamWatch
 
 _REMEMBERED = 5
 """Frame sets that an overlap is measured on."""
@@ -45,11 +46,11 @@ class CompositorBuilder:
         Why there is no newer compositor; '' if nothing is wrong.
     """
 
-    def __init__(self, rig: RigState):
-        """Start idle; `rig` is what is known of the cameras."""
+    def __init__(self, rig: RigState, watch: SeamWatch):
+        """Start idle; `rig` is what is known of the cameras, `watch` what was seen over time."""
         self.compositor: Compositor | None = None
         self.trouble = ''
-        self._rig = rig
+        self._rig, self._watch = rig, watch
         self._background = Background(self._failed)
         self._lock = Lock()
         self._recent: deque[_Remembered] = deque(maxlen=_REMEMBERED)
@@ -201,7 +202,7 @@ class CompositorBuilder:
         self, remembered: list[_Remembered], settings: PanoramaOutputSettings, method: str
     ) -> list[Overlap]:
         images = [frames.images for frames in remembered]
-        overlaps = self._rig.measure(images, settings, method)
+        overlaps = self._watch.sharpened(self._rig.measure(images, settings, method))
         return [replace(overlap, stamp_ns=remembered[-1].stamp_ns) for overlap in overlaps]
 
     def _use(self, newest: _Remembered, settings: PanoramaOutputSettings) -> None:

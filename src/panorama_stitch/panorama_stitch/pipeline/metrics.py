@@ -32,6 +32,7 @@ def metrics(pipeline: StitchPipeline) -> dict[str, float | str]:
         values[f'{pair} overlap'] = f'found by {overlap.method}' if overlap.found else 'none'
         values[f'{pair} offset px'] = overlap.offset_x_px
         values[f'{pair} confidence'] = overlap.confidence
+    values.update(pipeline.watch.metrics())
     return values
 
 

@@ -98,6 +98,14 @@ class RigState:
         """What the corrected images show, all with the focal length of the first."""
         return [surface for _, surface in sorted(_with_one_focal(self._places).items())]
 
+    @property
+    def camera_views(self) -> list[CameraView]:
+        """What the images of each camera show."""
+        return [
+            CameraView(self._places[index].source, surface, self._bodies[index])
+            for index, surface in enumerate(self.surfaces)
+        ]
+
     def place(
         self, camera: str, source: Lens | Surface, surface: Surface, interpolation: str = 'linear'
     ) -> bool:
@@ -295,10 +303,8 @@ class RigState:
         )
 
     def _pair_input(self, pair: Pair, frame_sets: Sequence[Images]) -> PairInput:
-        surfaces = self.surfaces
-        left, right = (
-            CameraView(self._places[i].source, surfaces[i], self._bodies[i]) for i in pair
-        )
+        views = self.camera_views
+        left, right = views[pair.left], views[pair.right]
         images = [(each[pair.left], each[pair.right]) for each in frame_sets]
         one, other = self._mounts[pair.left], self._mounts[pair.right]
         if one.is_known and other.is_known:

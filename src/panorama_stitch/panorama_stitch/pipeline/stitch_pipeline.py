@@ -27,6 +27,7 @@ from panorama_stitch.pipeline.economy import Economy
 from panorama_stitch.pipeline.pairing import FramePairing
 from panorama_stitch.pipeline.panorama_settings import MountSettings, PanoramaOutputSettings
 from panorama_stitch.pipeline.rig_state import RigState
+from panorama_stitch.pipeline.seam_watch import SeamWatch
 from panorama_stitch.pipeline.stale import StaleCameras, write_age
 
 _GRAVITY_RAD = np.radians(0.5)
@@ -111,6 +112,8 @@ class StitchPipeline:
         In use; `apply` changes them.
     rig : RigState
         What is known of the cameras.
+    watch : SeamWatch
+        How well the overlaps in use hold.
     pairing : FramePairing
         What waits for its partner.
     rates : dict of RateMeter
@@ -141,7 +144,8 @@ class StitchPipeline:
         self.rates = {camera: RateMeter() for camera in settings.cameras}
         self.broken = 0
         self.economy = Economy()
-        self._builder = CompositorBuilder(self.rig)
+        self.watch = SeamWatch(self.rig)
+        self._builder = CompositorBuilder(self.rig, self.watch)
         self._stale = StaleCameras(settings.cameras)
         self._waiting: LatestOnlyQueue[_FrameSet] = LatestOnlyQueue(_WAITING)
         self._lock = Lock()
@@ -235,6 +239,7 @@ class StitchPipeline:
         """End `next` and the background work."""
         self._waiting.close()
         self._builder.stop()
+        self.watch.stop()
 
     @property
     def compositor(self) -> Compositor | None:
@@ -317,7 +322,10 @@ class StitchPipeline:
         compositor = self.compositor
         if compositor is None or not compositor.fits(images):
             return None
-        if frames.ages_s:
+        if not frames.ages_s:
+            if self.watch.is_due:
+                self.watch.take(images, self.overlaps)
+        else:
             images = alike(
                 [
                     self._stale.dim(camera, image) if camera in frames.ages_s else image
