@@ -90,6 +90,9 @@ class PairInput:
         ]
 
 
+_AS_SURE = 0.43
+"""So large a correlation, as a share of a probability, is as sure as that."""
+
 Method = Callable[[PairInput, OverlapSettings], Overlap]
 
 
@@ -163,6 +166,8 @@ def _supported(attitude: Attitude, result, settings: OverlapSettings) -> Attitud
 
 def by_correlation(pair: PairInput, settings: OverlapSettings) -> Overlap:
     """Correlate the corrected images at every offset."""
+    needed = _AS_SURE * settings.min_confidence
+    settings = replace(settings, min_confidence=needed)
     return measure_corrected(pair.corrected(), *pair.surfaces, settings, 'correlation')
 
 

@@ -21,8 +21,9 @@ class OverlapSettings:
         live=True,
     )
     min_confidence: float = setting(
-        0.3,
-        'Confidence below which two views count as having no common scene.',
+        0.7,
+        'Confidence below which two views count as having no common scene; by particles a '
+        'probability.',
         minimum=0.0,
         maximum=1.0,
         live=True,

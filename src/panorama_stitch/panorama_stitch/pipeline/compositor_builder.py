@@ -235,7 +235,7 @@ def _believed(result: Overlap, left: Surface, needed: float) -> Overlap:
 
     The published rule always names an offset: asked for once, it must not ruin a rig that runs.
     """
-    if not result.found or result.confidence >= needed:
+    if result.method != 'paper' or not result.found or result.confidence >= needed:
         return result
     message = (
         f'{result.message}; not used: its confidence is {result.confidence:.2f}, '
