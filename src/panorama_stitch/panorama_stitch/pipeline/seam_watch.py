@@ -15,7 +15,7 @@ from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.rig import Pair
 from panorama_stitch.overlap.monitor import SeamMonitor, SeamState
 from panorama_stitch.overlap.overlap_result import Overlap
-from panorama_stitch.overlap.view import View
+from panorama_stitch.overlap.view import OverlapView
 from panorama_stitch.pipeline.rig_state import RigState
 
 _EVERY_S = 1.0
@@ -100,7 +100,7 @@ class SeamWatch:
     ) -> None:
         watched: dict[Pair, _Watched] = {}
         views = [
-            View(image, view.source, view.body)
+            OverlapView(image, view.source, view.body)
             for image, view in zip(images, self._rig.camera_views, strict=True)
         ]
         for pair, overlap in zip(self._rig.pairs, overlaps, strict=False):
