@@ -35,6 +35,7 @@ class Rules:
         self.argv = words
         self.launch_configurations = dict(word.split(':=', 1) for word in words)
         self._everywhere: list[str] = []
+        self._namespace: tuple[str, ...] = ()
         self._files = tempfile.TemporaryDirectory()
         self._processes: dict[subprocess.Popen, tuple[list[str], SimpleNamespace]] = {}
         self._is_ended = False
@@ -53,10 +54,16 @@ class Rules:
             },
             'launch.actions': {
                 name: entity(name)
-                for name in ('DeclareLaunchArgument', 'OpaqueFunction', 'SetEnvironmentVariable')
+                for name in (
+                    *('DeclareLaunchArgument', 'OpaqueFunction', 'SetEnvironmentVariable'),
+                    *('GroupAction', 'IncludeLaunchDescription'),
+                )
             },
+            'launch.launch_description_sources': {'PythonLaunchDescriptionSource': str},
             'launch_ros': {},
-            'launch_ros.actions': {name: entity(name) for name in ('Node', 'SetParameter')},
+            'launch_ros.actions': {
+                name: entity(name) for name in ('Node', 'SetParameter', 'PushRosNamespace')
+            },
         }
 
     def visit(self, entity: SimpleNamespace) -> None:
@@ -70,8 +77,27 @@ class Rules:
         elif entity.kind == 'OpaqueFunction':
             for made in entity.function(self):
                 self.visit(made)
+        elif entity.kind == 'PushRosNamespace':
+            self._namespace += entity.words
+        elif entity.kind == 'IncludeLaunchDescription':
+            self.launch_configurations.update(entity.launch_arguments)
+            self.include(entity.words[0])
+        elif entity.kind == 'GroupAction':
+            outside = self.launch_configurations, self._everywhere, self._namespace
+            self.launch_configurations, self._everywhere = dict(outside[0]), [*outside[1]]
+            for inner in entity.words[0]:
+                self.visit(inner)
+            self.launch_configurations, self._everywhere, self._namespace = outside
         else:
             self._start(self._command(entity), entity)
+
+    def include(self, path: str) -> None:
+        """Carry out what a launch file describes."""
+        spec = importlib.util.spec_from_file_location('launched', path)
+        file = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(file)
+        for entity in file.generate_launch_description():
+            self.visit(entity)
 
     def run(self) -> None:
         """Wait for the end."""
@@ -97,9 +123,10 @@ class Rules:
     def _command(self, node: SimpleNamespace) -> list[str]:
         folder = Path(get_package_prefix(node.package)) / 'lib' / node.package
         files = [f if isinstance(f, str) else self._file(f) for f in node.parameters]
+        namespace = '/'.join(('', *self._namespace, *filter(None, [node.namespace])))
         return [
             str(folder / node.executable),
-            *('--ros-args', '-r', f'__node:={node.name}', '-r', f'__ns:=/{node.namespace}'),
+            *('--ros-args', '-r', f'__node:={node.name}', '-r', f'__ns:={namespace or "/"}'),
             *(word for file in (*self._everywhere, *files) for word in ('--params-file', file)),
         ]
 
@@ -115,11 +142,7 @@ def run_rules(path: str, words: list[str]) -> None:
     for name, content in rules.modules().items():
         module = sys.modules[name] = ModuleType(name)
         vars(module).update(content)
-    spec = importlib.util.spec_from_file_location('launched', path)
-    file = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(file)
-    for entity in file.generate_launch_description():
-        rules.visit(entity)
+    rules.include(path)
     rules.run()
 
 

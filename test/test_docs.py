@@ -7,7 +7,11 @@ import parameter_tables
 import pytest
 
 ROOT = Path(__file__).parents[1]
-PAGES = sorted(ROOT.glob('*.md')) + sorted((ROOT / 'docs').glob('*.md'))
+PAGES = [
+    page
+    for pattern in ('*.md', 'docs/*.md', 'examples/*.md')
+    for page in sorted(ROOT.glob(pattern))
+]
 
 
 @pytest.mark.parametrize('page', PAGES, ids=lambda path: path.name)

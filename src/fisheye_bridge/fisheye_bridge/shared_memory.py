@@ -6,6 +6,8 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
+from ament_index_python.packages import get_package_share_directory
+
 FOLDER = Path('/dev/shm')
 _PROFILE, _SMALL_PROFILE = 'fastdds.xml', 'fastdds_small.xml'
 _MIB = 1 << 20
@@ -20,7 +22,8 @@ _YOUNG_S = 1.0
 def prepare(folder: Path = FOLDER) -> str:
     """Clear what killed processes left and use the profile that fits the room.
 
-    To be called before the first node is made.
+    To be called before the first node is made. A profile that the environment names is kept; where
+    it names none, as in an installed Debian package, this package's own is taken.
 
     Parameters
     ----------
@@ -35,10 +38,12 @@ def prepare(folder: Path = FOLDER) -> str:
     if os.environ.get('RMW_IMPLEMENTATION', 'rmw_fastrtps_cpp') != 'rmw_fastrtps_cpp':
         return ''
     _clear(folder)
+    own = Path(get_package_share_directory('fisheye_bridge'), 'config', _PROFILE)
+    os.environ.setdefault(_VARIABLE, str(own))
     room = _room(folder)
     if room >= _NEEDED:
         return ''
-    profile = Path(os.environ.get(_VARIABLE, ''))
+    profile = Path(os.environ[_VARIABLE])
     small = profile.with_name(_SMALL_PROFILE) if profile.name == _PROFILE else profile
     has = f'{folder} has room for {room // _MIB} MiB; expected {_NEEDED // _MIB} for each process'
     if room >= _NEEDED_SMALL and small.is_file():

@@ -3,9 +3,11 @@
 import fcntl
 import os
 import re
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from ament_index_python.packages import get_package_share_directory
 
 from fisheye_bridge import shared_memory
 from fisheye_bridge.shared_memory import prepare
@@ -66,6 +68,19 @@ def test_the_users_own_profile_stays(room, tmp_path, monkeypatch):
     room(64)
     assert 'go over UDP' in prepare(tmp_path)
     assert os.environ[PROFILE] == str(tmp_path / 'own.xml')
+
+
+def test_without_a_profile_the_package_gives_its_own(room, tmp_path, monkeypatch):
+    share = Path(get_package_share_directory('fisheye_bridge'), 'config')
+    monkeypatch.delenv(PROFILE)
+    room(1000)
+    assert prepare(tmp_path) == ''
+    assert os.environ[PROFILE] == str(share / 'fastdds.xml')
+    assert Path(os.environ[PROFILE]).is_file()
+    monkeypatch.delenv(PROFILE)
+    room(64)
+    assert 'may be lost' in prepare(tmp_path)
+    assert os.environ[PROFILE] == str(share / 'fastdds_small.xml')
 
 
 def test_another_middleware_is_left_alone(monkeypatch, tmp_path):
