@@ -24,7 +24,8 @@ from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.camera_file import Camera, write_camera
 from fisheye_testing import network_camera
 from fisheye_testing.painted_time import BLOCKS, age_ms, centres_px, read
-from fisheye_testing.rig import SIDES, RigProcesses, unused_domain, wait_for
+from fisheye_testing.rig import SIDES, RigProcesses, unused_domain
+from fisheye_testing.waiting import wait_for
 from fisheye_testing.watcher import Watcher
 
 SIZE = 640, 480

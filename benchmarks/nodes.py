@@ -15,7 +15,8 @@ from targets import Requirement
 
 from fisheye_geometry.camera_file import Camera, write_camera
 from fisheye_testing.health import usage
-from fisheye_testing.rig import RigProcesses, camera_parameters, unused_domain, wait_for
+from fisheye_testing.rig import RigProcesses, camera_parameters, unused_domain
+from fisheye_testing.waiting import wait_for
 from fisheye_testing.watcher import Watcher
 
 FULL_SPEED_HZ = 1000.0

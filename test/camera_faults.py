@@ -6,7 +6,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from field import START_S, Field
 
 from fisheye_testing.mjpeg_server import jpeg
-from fisheye_testing.rig import wait_for
+from fisheye_testing.waiting import wait_for
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 LIVELY = 0.7

@@ -1,32 +1,21 @@
 """What the tests across packages share: real pictures, real processes, and ways to hurt them."""
 
-import os
 from pathlib import Path
 
 import hypothesis
 import pytest
 from field import Field
 
+from fisheye_testing.data import data_folder
 from fisheye_testing.rig import RigProcesses, unused_domain
 from fisheye_testing.watcher import Watcher
-
-DATA = Path(os.environ.get('FISHEYE_DATA', ''))
 
 
 @pytest.fixture
 def real_rig():
     """Return the folder of a rig of real pictures by its name."""
 
-    def folder(name: str) -> Path:
-        path = DATA / 'rigs' / name
-        if not path.is_dir():
-            message = f'{path} is not there: real pictures are looked for in $FISHEYE_DATA'
-            if os.environ.get('REQUIRE_DATA') == '1':
-                pytest.fail(message)
-            pytest.skip(message)
-        return path
-
-    return folder
+    return lambda name: data_folder('rigs', name)
 
 
 @pytest.fixture

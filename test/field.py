@@ -13,7 +13,8 @@ from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.camera_file import Camera, write_camera
 from fisheye_testing.health import Health
 from fisheye_testing.mjpeg_server import MjpegServer
-from fisheye_testing.rig import SIDES, RigProcesses, wait_for
+from fisheye_testing.rig import SIDES, RigProcesses
+from fisheye_testing.waiting import wait_for
 
 START_S = 60.0
 """For what happens some time, even where much else runs too."""

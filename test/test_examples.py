@@ -13,7 +13,8 @@ import pytest
 from fisheye_geometry.camera_file import read_camera
 from fisheye_geometry.remap import remap_table
 from fisheye_geometry.surface import surface_for
-from fisheye_testing.rig import SIDES, wait_for
+from fisheye_testing.rig import SIDES
+from fisheye_testing.waiting import wait_for
 from fisheye_testing.watcher import Watcher
 
 EXAMPLES = Path(__file__).parents[1] / 'examples'

@@ -7,7 +7,8 @@ import pytest
 from camera_faults import ERROR, OK, check_camera_fault
 from field import START_S
 
-from fisheye_testing.rig import SEPARATE, wait_for
+from fisheye_testing.rig import SEPARATE
+from fisheye_testing.waiting import wait_for
 
 SAME_PX = 1e-6
 """An offset that was kept, not measured again."""

@@ -6,7 +6,8 @@ from fisheye_msgs.srv import CalibrateOverlap
 from rcl_interfaces.srv import GetParameters
 
 from fisheye_testing.health import Health
-from fisheye_testing.rig import SIDES, wait_for
+from fisheye_testing.rig import SIDES
+from fisheye_testing.waiting import wait_for
 
 LARGE = {'width': 1920, 'height': 1440}
 """Pictures of this size keep a measurement busy for a while."""

@@ -10,7 +10,8 @@ import pytest
 from field import RETURN_S, START_S
 from namespaces import Link
 
-from fisheye_testing.rig import SIDES, RigProcesses, wait_for
+from fisheye_testing.rig import SIDES, RigProcesses
+from fisheye_testing.waiting import wait_for
 
 LONG = bool(os.environ.get('LONG'))
 RATE_HZ = 30.0

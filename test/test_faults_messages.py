@@ -19,7 +19,7 @@ from fisheye_bridge.stamps import stamp_of
 from fisheye_core.errors import FisheyeError
 from fisheye_testing.health import usage
 from fisheye_testing.image_message import to_message
-from fisheye_testing.rig import wait_for
+from fisheye_testing.waiting import wait_for
 from fisheye_undistort.undistort_settings import UndistortSettings
 
 EXAMPLES, FEW = (1000, 1000) if os.environ.get('LONG') else (200, 50)

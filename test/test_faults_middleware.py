@@ -12,7 +12,8 @@ from field import START_S
 from namespaces import Namespace
 
 from fisheye_testing.health import usage
-from fisheye_testing.rig import SEPARATE, SIDES, RigProcesses, wait_for
+from fisheye_testing.rig import SEPARATE, SIDES, RigProcesses
+from fisheye_testing.waiting import wait_for
 from fisheye_testing.watcher import Watcher
 
 TOOLS = Path(__file__).parents[1] / 'tools'

@@ -8,7 +8,8 @@ from camera_faults import check_camera_fault
 from field import START_S, write_pictures
 
 from fisheye_testing.health import usage
-from fisheye_testing.rig import SIDES, wait_for
+from fisheye_testing.rig import SIDES
+from fisheye_testing.waiting import wait_for
 
 LONG = bool(os.environ.get('LONG'))
 BREAKS = [camera_faults.stop, camera_faults.come_back_smaller]

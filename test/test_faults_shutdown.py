@@ -12,7 +12,8 @@ from sensor_msgs.msg import Image
 from fisheye_bridge.qos import IMAGE_INPUT
 from fisheye_testing.health import Health
 from fisheye_testing.mjpeg_server import MjpegServer, jpeg
-from fisheye_testing.rig import SIDES, RigProcesses, unused_domain, wait_for
+from fisheye_testing.rig import SIDES, RigProcesses, unused_domain
+from fisheye_testing.waiting import wait_for
 
 STOP_S = 2.0
 NOBODY = 'http://127.0.0.1:9/stream'

@@ -11,7 +11,8 @@ from ament_index_python.packages import PackageNotFoundError, get_package_prefix
 from field import START_S
 
 from fisheye_testing.health import Health
-from fisheye_testing.rig import RigProcesses, wait_for
+from fisheye_testing.rig import RigProcesses
+from fisheye_testing.waiting import wait_for
 
 FILE = Path(__file__).parents[1] / 'src' / 'panorama_stitch' / 'launch' / 'panorama.launch.py'
 CAPTURES = ('left/capture', 'right/capture')

@@ -64,6 +64,7 @@ MODULES = [
     for package in OURS
     for path in sorted((SOURCE / package / package).rglob('*.py'))
 ]
+TESTS = sorted([*SOURCE.glob('*/test/**/test_*.py'), *Path(__file__).parent.glob('*.py')])
 
 
 def imports(path):
@@ -138,6 +139,16 @@ def test_every_import_of_tests_and_launch_files_is_declared(folder):
     )
     tops = {name.split('.')[0] for path in files for name in imports(path)} - own
     assert {KEYS.get(name, name) for name in tops} <= declared
+
+
+@pytest.mark.parametrize('path', TESTS, ids=lambda path: path.stem)
+def test_tests_reach_into_nothing_private(path):
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Attribute) and node.attr.startswith('_') and node.attr[1] != '_':
+            assert ast.unparse(node.value) == 'self', ast.unparse(node)
+        elif isinstance(node, ast.ImportFrom):
+            private = [a.name for a in node.names if a.name[0] == '_' and a.name[:2] != '__']
+            assert not private, f'{node.module}: {private}'
 
 
 def test_no_other_library_is_imported():

@@ -21,7 +21,8 @@ from fisheye_bridge.qos import IMAGE_INPUT, LATCHED
 from fisheye_bridge.stamps import stamp_of
 from fisheye_geometry.surface import Surface
 from fisheye_testing.free_running import CameraTiming
-from fisheye_testing.rig import SIDES, wait_for
+from fisheye_testing.rig import SIDES
+from fisheye_testing.waiting import wait_for
 
 WATCHED_S = 8.0
 START_S = 40.0

@@ -10,7 +10,8 @@ from sensor_msgs.msg import CameraInfo, CompressedImage
 
 from fisheye_bridge.camera_info import camera_of
 from fisheye_bridge.stamps import ns_of
-from fisheye_testing.rig import COMPOSED, SEPARATE, SIDES, camera_parameters, wait_for
+from fisheye_testing.rig import COMPOSED, SEPARATE, SIDES, camera_parameters
+from fisheye_testing.waiting import wait_for
 
 RATE_HZ = 30.0
 WATCHED_S = float(os.environ.get('WATCHED_S', '8'))

@@ -17,7 +17,7 @@ from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.camera_file import Camera
 from fisheye_testing.image_message import to_message
-from fisheye_testing.rig import wait_for
+from fisheye_testing.waiting import wait_for
 
 START_S = 40.0
 RECORDED_NS = 1_600_000_000_000_000_000

@@ -12,7 +12,8 @@ from field import write_pictures
 
 from fisheye_testing.health import Health
 from fisheye_testing.mjpeg_server import MjpegServer
-from fisheye_testing.rig import SIDES, executable, wait_for
+from fisheye_testing.rig import SIDES, executable
+from fisheye_testing.waiting import wait_for
 
 START_S = 40.0
 CLOSE_PX = 1.5

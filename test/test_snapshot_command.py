@@ -9,7 +9,8 @@ import cv2
 import pytest
 from ament_index_python.packages import get_package_prefix
 
-from fisheye_testing.rig import camera_parameters, wait_for
+from fisheye_testing.rig import camera_parameters
+from fisheye_testing.waiting import wait_for
 
 COMMAND = Path(get_package_prefix('panorama_viewer')) / 'lib' / 'panorama_viewer' / 'snapshot'
 START_S = 40.0

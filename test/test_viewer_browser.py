@@ -19,7 +19,8 @@ from selenium.webdriver import ActionChains, Keys
 from fisheye_bridge.projection import surface_of
 from fisheye_geometry.surface import Surface
 from fisheye_geometry.surface_kind import KINDS
-from fisheye_testing.rig import camera_parameters, wait_for
+from fisheye_testing.rig import camera_parameters
+from fisheye_testing.waiting import wait_for
 from panorama_viewer.projection import described
 from panorama_viewer.server import ViewerServer
 from panorama_viewer.settings import ViewerSettings

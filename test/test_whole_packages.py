@@ -51,7 +51,8 @@ class Workspaces:
             folder.mkdir()
             self.check('git archive HEAD "src/$0" | tar x -C "$1"', package, folder, where=ROOT)
             self.check(
-                'colcon build --base-paths src --cmake-args -DBUILD_TESTING=OFF',
+                'colcon build --base-paths src --metas "$0"',
+                ROOT / 'colcon.meta',
                 where=folder,
                 packages=below,
             )

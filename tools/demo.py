@@ -16,7 +16,8 @@ from fisheye_capture.capture_settings import CaptureSettings
 from fisheye_capture.synthetic import synthetic_lens
 from fisheye_core.errors import FisheyeError, OverlapError
 from fisheye_geometry.camera_file import read_camera
-from fisheye_testing.rig import SIDES, RigProcesses, camera_parameters, unused_domain, wait_for
+from fisheye_testing.rig import SIDES, RigProcesses, camera_parameters, unused_domain
+from fisheye_testing.waiting import wait_for
 from fisheye_testing.watcher import Watcher
 from fisheye_undistort.correction import Correction
 from fisheye_undistort.undistort_settings import UndistortSettings

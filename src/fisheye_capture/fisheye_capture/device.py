@@ -26,12 +26,12 @@ _PATIENCE_S = 4.0
 """A device may take this long to give its first picture, or to go on after a hiccup."""
 _BUFFERS = 2
 """One that is read and one that fills; with one alone, drivers lose every other picture."""
-_SELECT_TIMEOUT_S = 1
+SELECT_TIMEOUT_S = 1
 _NS_PER_MS = 1_000_000
 _VIDEO4LINUX = 81
 """Major number of its devices."""
 # How long OpenCV waits for a picture of a device; it looks when it waits for the first time.
-os.environ.setdefault('OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT', str(_SELECT_TIMEOUT_S))
+os.environ.setdefault('OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT', str(SELECT_TIMEOUT_S))
 
 
 def jpeg_frame(stamp_ns: int, data: np.ndarray, encoding: str) -> JpegFrame | None:
@@ -103,7 +103,7 @@ class DeviceSource(Source):
         self._capture.release()
 
     def interrupt(self) -> None:
-        """End a wait within `_SELECT_TIMEOUT_S`."""
+        """End a wait within `SELECT_TIMEOUT_S`."""
         self._interrupted = True
 
     def _set_up(self, settings):
@@ -155,6 +155,6 @@ class DeviceSource(Source):
                 return
             now_s = time.monotonic()
             # A failure without a wait is no slow camera but a lost one.
-            if now_s - began_s < _SELECT_TIMEOUT_S / 2 or now_s > deadline_s:
+            if now_s - began_s < SELECT_TIMEOUT_S / 2 or now_s > deadline_s:
                 raise SourceLostError(f'{self._name} stopped sending pictures')
         raise SourceEndedError('the source was closed')

@@ -1,6 +1,5 @@
 """What the tests of this package share."""
 
-import time
 from dataclasses import replace
 
 import cv2
@@ -8,23 +7,13 @@ import numpy as np
 import pytest
 
 from fisheye_capture.capture_settings import CaptureSettings
-
-PATIENCE_S = 20.0
-"""Long enough for a busy machine; nothing waits for it that works."""
+from fisheye_testing.waiting import wait_for
 
 
 @pytest.fixture
 def wait_until():
     """Wait until a condition holds; fail when that takes too long."""
-
-    def wait(condition, what):
-        deadline_s = time.monotonic() + PATIENCE_S
-        while not condition():
-            if time.monotonic() > deadline_s:
-                pytest.fail(f'{what} did not come about within {PATIENCE_S:g} s')
-            time.sleep(0.005)
-
-    return wait
+    return lambda condition, what: wait_for(condition, what=what)
 
 
 @pytest.fixture

@@ -167,7 +167,7 @@ def test_a_slow_device_is_waited_for(open_device, monkeypatch):
     """Its first pictures take longer than one wait of OpenCV's."""
     capture = Capture([GOOD])
     grabs = iter([False, False, True])
-    seconds = itertools.count(step=device_module._SELECT_TIMEOUT_S)
+    seconds = itertools.count(step=device_module.SELECT_TIMEOUT_S)
     monkeypatch.setattr(capture, 'grab', lambda: next(grabs) and Capture.grab(capture))
     device = open_device(capture)
     monkeypatch.setattr(device_module.time, 'monotonic', lambda: next(seconds) / 2)

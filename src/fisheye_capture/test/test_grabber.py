@@ -1,5 +1,6 @@
 """Grabbing: frames while there are any, and a lost camera that comes back."""
 
+import threading
 from threading import Event
 
 import pytest
@@ -129,7 +130,7 @@ def test_each_lost_source_is_closed_before_it_is_opened_again(grab, wait_until, 
 def test_it_stops_in_every_state(grab, source):
     grabber, _ = grab(source, frame_rate_hz=0.1, reconnect_max_s=3600.0)
     grabber.stop()
-    assert not grabber._thread.is_alive()
+    assert not [one for one in threading.enumerate() if one.name.startswith('grab ')]
 
 
 def test_changes_are_told(settings, wait_until, monkeypatch):

@@ -3,7 +3,7 @@
 from threading import Event
 
 from fisheye_core.latest_only import LatestOnlyQueue, LatestOnlyWorker
-from fisheye_testing.rig import wait_for
+from fisheye_testing.waiting import wait_for
 
 DEADLINE_S = 20.0
 

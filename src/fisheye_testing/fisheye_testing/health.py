@@ -8,7 +8,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from fisheye_testing.image_message import to_array
-from fisheye_testing.rig import wait_for
+from fisheye_testing.waiting import wait_for
 from fisheye_testing.watcher import Watcher
 
 _BRIGHT_SHARE = 0.7

@@ -9,7 +9,7 @@ import subprocess
 import tempfile
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -48,16 +48,6 @@ def unused_domain() -> int:
             return domain
         lock.close()
     raise RuntimeError('every ROS domain from 1 to 100 is in use by a test')
-
-
-def wait_for(condition: Callable[[], object], timeout_s: float, what: str) -> object:
-    """Poll until a condition holds and give its value; a `TimeoutError` that says what was due."""
-    deadline = time.monotonic() + timeout_s
-    while not (value := condition()):
-        if time.monotonic() > deadline:
-            raise TimeoutError(f'{what} did not happen within {timeout_s:g} s')
-        time.sleep(0.02)
-    return value
 
 
 def camera_parameters(folder: Path | None) -> dict[str, dict[str, object]]:

@@ -124,7 +124,7 @@ def fit(
     tolerance
         Relative change of the cost at which to stop.
     """
-    problem = _FitProblem(views, points_mm, nominal, free, bias_px)
+    problem = FitProblem(views, points_mm, nominal, free, bias_px)
     solution = least_squares(
         problem.residuals,
         problem.pack(start),
@@ -146,7 +146,7 @@ def fit(
     )
 
 
-class _FitProblem:
+class FitProblem:
     """Residuals and their derivatives as functions of one vector: free unknowns, then poses."""
 
     def __init__(self, views, points_mm, nominal, free, bias_px):
@@ -180,7 +180,7 @@ class _FitProblem:
 
     def residuals(self, vector):
         """Residuals (2 N,) px, damped so that the sum of their squares is a robust cost."""
-        return _damp(self.residuals_px(vector))[0].ravel()
+        return damp(self.residuals_px(vector))[0].ravel()
 
     def jacobian(self, vector):
         """Derivatives of `residuals`, (2 N, len(vector))."""
@@ -194,7 +194,7 @@ class _FitProblem:
         by_pose = np.concatenate([by_point @ by_turn, by_point], axis=-1)
         columns = count + _POSE * self._view[:, None] + np.arange(_POSE)
         np.put_along_axis(jacobian, columns[:, None, :].repeat(2, axis=1), by_pose, axis=-1)
-        jacobian *= _damp(pixels - self._found)[1][..., None]
+        jacobian *= damp(pixels - self._found)[1][..., None]
         return jacobian.reshape(-1, len(vector))
 
     def _to_camera(self, unknowns, poses):
@@ -219,7 +219,7 @@ class _FitProblem:
         return self._basis @ covariance @ self._basis.T
 
 
-def _damp(residuals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def damp(residuals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Pseudo-Huber: values whose squares grow linearly beyond `_OUTLIER_PX`, and their slopes.
 
     `least_squares` knows this loss by itself, but not together with MINPACK's method, which took

@@ -1,6 +1,5 @@
 """What the tests of this package share."""
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -8,10 +7,9 @@ import pytest
 from rendered_view import render_view, scattered_poses
 
 from fisheye_geometry.lens import FisheyeLens
+from fisheye_testing.data import data_folder
 from fisheye_undistort.lens_fit import TargetView
 from fisheye_undistort.target import STANDARD
-
-DATA = Path(os.environ.get('FISHEYE_DATA', ''))
 
 
 def fisheye(fov_deg: int, scale: int = 1) -> FisheyeLens:
@@ -40,13 +38,7 @@ def seen_exactly(lens, target, pose, name='view') -> TargetView:
 @pytest.fixture
 def shun74() -> Path:
     """Return the folder of real chessboard views."""
-    path = DATA / 'shun74'
-    if not path.is_dir():
-        message = f'{path} is not there: real pictures are looked for in $FISHEYE_DATA'
-        if os.environ.get('REQUIRE_DATA') == '1':
-            pytest.fail(message)
-        pytest.skip(message)
-    return path
+    return data_folder('shun74')
 
 
 @pytest.fixture(scope='session')

@@ -4,7 +4,7 @@ from conftest import seen_exactly
 from rendered_view import scattered_poses
 
 from fisheye_undistort.first_guess import first_guess
-from fisheye_undistort.lens_fit import GROUPS, Estimate, TargetView, _damp, _FitProblem, fit
+from fisheye_undistort.lens_fit import GROUPS, Estimate, FitProblem, TargetView, damp, fit
 from fisheye_undistort.sheet_model import UNKNOWNS, lens_of, project, warp_board
 from fisheye_undistort.target import Target
 
@@ -50,7 +50,7 @@ def test_derivatives_of_the_projection(ray):
 
 def test_derivatives_of_the_whole_problem(views):
     nominal = np.concatenate([UNKNOWN_TRUTH[:4] + 5, np.zeros(7)])
-    problem = _FitProblem(views, TARGET.points_mm, nominal, tuple(GROUPS), None)
+    problem = FitProblem(views, TARGET.points_mm, nominal, tuple(GROUPS), None)
     poses = np.tile([0.2, -0.1, 0.3, 10.0, 5.0, 180.0], (len(views), 1))
     vector = problem.pack(Estimate(UNKNOWN_TRUTH, poses))
     jacobian = problem.jacobian(vector)
@@ -60,7 +60,7 @@ def test_derivatives_of_the_whole_problem(views):
 
 def test_far_points_count_linearly():
     residuals = np.array([-100.0, -0.01, 0.0, 0.01, 100.0])
-    damped, _ = _damp(residuals)
+    damped, _ = damp(residuals)
     assert np.allclose(damped[1:4], residuals[1:4], rtol=1e-4)
     assert np.allclose(damped[[0, 4]] ** 2, 2 * 100, rtol=0.02)
     assert np.all(np.sign(damped) == np.sign(residuals))

@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from fisheye_msgs.msg import Projection
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
@@ -15,7 +16,6 @@ from sensor_msgs.msg import CameraInfo, Image, RegionOfInterest
 from std_msgs.msg import Header
 
 from fisheye_bridge.camera_info import camera_info_of
-from fisheye_bridge.diagnostics import Report
 from fisheye_bridge.images import to_array
 from fisheye_bridge.projection import surface_of
 from fisheye_bridge.qos import IMAGE, LATCHED
@@ -23,6 +23,7 @@ from fisheye_geometry.attitude import Attitude, quaternion
 from fisheye_geometry.camera_file import Camera
 from fisheye_geometry.lens import make_lens
 from fisheye_testing.image_message import to_message
+from fisheye_testing.waiting import wait_for
 from fisheye_undistort.undistort_node import UndistortNode
 from fisheye_undistort.undistort_settings import UndistortSettings
 
@@ -48,6 +49,8 @@ class Bench:
         self._tester.create_subscription(
             Projection, 'projection', self.projections.append, LATCHED
         )
+        self._statuses = []
+        self._tester.create_subscription(DiagnosticArray, '/diagnostics', self._take_status, 10)
         self._executor = SingleThreadedExecutor(context=self._context)
         for node in (self.node, self._tester):
             self._executor.add_node(node)
@@ -77,9 +80,27 @@ class Bench:
 
     def told(self):
         """Return what the node warns of in its diagnostics."""
-        report = Report()
-        self.node._report(report)
-        return '; '.join(report.reasons)
+        status = self.status()
+        return '' if status.level == DiagnosticStatus.OK else status.message
+
+    def status(self):
+        """Return the node's next diagnostics."""
+        self._statuses.clear()
+        wait_for(
+            lambda: self._executor.spin_once(timeout_sec=0.01) or self._statuses,
+            what='diagnostics',
+        )
+        return self._statuses[0]
+
+    def refused(self):
+        """Return how many pictures were refused."""
+        values = {entry.key: entry.value for entry in self.status().values}
+        return int(values['pictures refused'])
+
+    def _take_status(self, message):
+        self._statuses += [
+            s for s in message.status if s.hardware_id == self.node.get_fully_qualified_name()
+        ]
 
     def close(self):
         self._executor.shutdown()
@@ -251,12 +272,8 @@ def test_unusable_pictures_are_dropped_and_counted(make_bench):
     bench.until(lambda: bench.pictures, 'a picture')
     small = np.zeros((12, 16, 3), np.uint8)
     for sending in ({'encoding': '16UC1'}, {'picture': small}, {'encoding': 'bgra8'}):
-        refused = bench.node._camera.pictures.dropped.count
-        bench.until(
-            lambda before=refused: bench.node._camera.pictures.dropped.count > before,
-            'refusal',
-            **sending,
-        )
+        before = bench.refused()
+        bench.until(lambda before=before: bench.refused() > before, 'refusal', **sending)
     count = len(bench.pictures)
     bench.until(lambda: len(bench.pictures) > count, 'a picture again')
 

@@ -1,12 +1,9 @@
 """Constructed pairs of views of one world, whose overlap is known exactly."""
 
-import os
 from math import pi, radians
-from pathlib import Path
 
 import cv2
 import numpy as np
-import pytest
 
 from fisheye_geometry.attitude import LEVEL, Attitude
 from fisheye_geometry.camera_file import read_camera
@@ -14,12 +11,12 @@ from fisheye_geometry.image_circle import ImageCircle
 from fisheye_geometry.lens import FisheyeLens
 from fisheye_geometry.remap import RemapTable
 from fisheye_geometry.surface import Surface, surface_for
+from fisheye_testing.data import data_folder
 from panorama_stitch.compose.placing import place
 from panorama_stitch.compose.posing import views_at_overlaps
 from panorama_stitch.compose.view import View
 from panorama_stitch.overlap.overlap_result import Overlap
 
-DATA = Path(os.environ.get('FISHEYE_DATA', ''))
 YAW_DEG = 140.0
 _AROUND = 2048
 
@@ -94,17 +91,6 @@ def exposed(picture: np.ndarray, gain: float, noise: float, seed: int = 7) -> np
 def masked(picture: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Show values, of any range, where a picture shows something."""
     return _seen_as(picture, values)
-
-
-def data_folder(name: str) -> Path:
-    """Return a folder of real pictures; skip the test where it is absent."""
-    folder = DATA / name
-    if not folder.is_dir():
-        message = f'{folder} is not there: real pictures are looked for in $FISHEYE_DATA'
-        if os.environ.get('REQUIRE_DATA') == '1':
-            pytest.fail(message)
-        pytest.skip(message)
-    return folder
 
 
 def real_views(name: str, kind: str = 'cylindrical', turn: Attitude = LEVEL):

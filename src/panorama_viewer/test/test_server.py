@@ -1,7 +1,6 @@
 import asyncio
 import re
 import socket
-import time
 from contextlib import closing
 from http.client import HTTPConnection
 from pathlib import Path
@@ -13,17 +12,11 @@ from serving import DEADLINE_S, address, answered, picture, request, state, visi
 
 import panorama_viewer
 from fisheye_core.errors import OverlapError, SettingError
+from fisheye_testing.waiting import wait_for
 from panorama_viewer.server import ViewerServer
 from panorama_viewer.settings import ViewerSettings
 
 WEB = Path(panorama_viewer.__file__).parent / 'web'
-
-
-def wait_for(condition):
-    deadline = time.monotonic() + DEADLINE_S
-    while not condition():
-        assert time.monotonic() < deadline, 'it did not happen'
-        time.sleep(0.01)
 
 
 def test_the_page_is_there_and_needs_nothing_from_elsewhere(serve):

@@ -24,6 +24,7 @@ from sensor_msgs.msg import CompressedImage
 from fisheye_bridge.qos import IMAGE, LATCHED
 from fisheye_bridge.stamps import stamp_of
 from fisheye_core.errors import SettingError
+from fisheye_testing.waiting import wait_for
 from panorama_viewer import viewer_node
 from panorama_viewer.viewer_node import ViewerNode
 
@@ -103,13 +104,6 @@ def viewer(ros, **parameters):
         namespace='/rig',
         parameter_overrides=[Parameter(name, value=v) for name, v in parameters.items()],
     )
-
-
-def wait_for(condition):
-    deadline = time.monotonic() + DEADLINE_S
-    while not condition():
-        assert time.monotonic() < deadline, 'it did not happen'
-        time.sleep(0.01)
 
 
 def visit(scenario):

@@ -1,9 +1,7 @@
 """Rigs of real pictures: level, tilted, turned over, with things near and the robot itself."""
 
 import json
-import os
 from itertools import pairwise
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -11,10 +9,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from fisheye_geometry.camera_file import read_camera
+from fisheye_testing.data import data_folder
 from panorama_stitch.overlap.measure import measure_rotation
 from panorama_stitch.overlap.view import OverlapView
 
-DATA = Path(os.environ.get('FISHEYE_DATA', ''))
 RIGHT_RAD = np.radians(0.5)
 """What an operator sees as a step in the panorama."""
 CONFIDENT, DOUBTFUL = 0.8, 0.5
@@ -45,16 +43,6 @@ FIELD = [
 APART = ('apart_lobby', 'apart_mixed')
 
 
-def folder(*parts):
-    path = DATA.joinpath(*parts)
-    if not path.is_dir():
-        message = f'{path} is not there: real pictures are looked for in $FISHEYE_DATA'
-        if os.environ.get('REQUIRE_DATA') == '1':
-            pytest.fail(message)
-        pytest.skip(message)
-    return path
-
-
 def view(path, camera):
     image = cv2.imread(str(path / f'{camera}.png'))
     return OverlapView(image, read_camera(path / f'{camera}.yaml').lens)
@@ -62,7 +50,7 @@ def view(path, camera):
 
 @pytest.mark.parametrize('name', FIELD)
 def test_every_neighbouring_pair_of_a_rig_is_right(name):
-    path = folder('field', name)
+    path = data_folder('field', name)
     truth = json.loads((path / 'truth.json').read_text())
     cameras, attitudes = truth['cameras'], truth['attitude']
     neighbours = list(pairwise(cameras))
@@ -80,6 +68,6 @@ def test_every_neighbouring_pair_of_a_rig_is_right(name):
 
 @pytest.mark.parametrize('name', APART)
 def test_views_without_a_common_scene_are_not_believed(name):
-    path = folder('rigs', name)
+    path = data_folder('rigs', name)
     result = measure_rotation([(view(path, 'left'), view(path, 'right'))])
     assert result is None or result.confidence < DOUBTFUL

@@ -1,0 +1,22 @@
+"""Real pictures: where they are, and what a test does without them."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+DATA = Path(os.environ.get('FISHEYE_DATA', ''))
+
+
+def data_folder(*parts: str) -> Path:
+    """Return a folder of real pictures; without it the test is skipped, or fails.
+
+    It fails where the environment has REQUIRE_DATA=1.
+    """
+    folder = DATA.joinpath(*parts)
+    if not folder.is_dir():
+        message = f'{folder} is not there: real pictures are looked for in $FISHEYE_DATA'
+        if os.environ.get('REQUIRE_DATA') == '1':
+            pytest.fail(message)
+        pytest.skip(message)
+    return folder
