@@ -18,13 +18,13 @@ from fisheye_geometry.surface import surface_for
 from panorama_stitch.compose.build import Style, build_compositor
 from panorama_stitch.compose.posing import views_of_rig
 from panorama_stitch.overlap.measure import measure_rotation
-from panorama_stitch.overlap.view import View
+from panorama_stitch.overlap.view import OverlapView
 
 folder, output, sides = Path(sys.argv[1]), sys.argv[2], ('left', 'right')
 images = [read_picture(folder / f'{side}.png') for side in sides]
 lenses = [read_camera(folder / f'{side}.yaml').lens for side in sides]
 
-found = measure_rotation([tuple(map(View, images, lenses))])
+found = measure_rotation([tuple(map(OverlapView, images, lenses))])
 if found is None or found.confidence < 0.5:
     sys.exit('The pictures have too little in common.')
 rig = solve_rig([*zip(sides, lenses, strict=True)], [found.rotation.as_matrix()]).rig
