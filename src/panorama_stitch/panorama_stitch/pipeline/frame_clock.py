@@ -47,6 +47,7 @@ class FrameClock:
         if beats is None:
             self._stamps.clear()
             self._beats.clear()
+            beats = 0
         self._beats.append(self._beats[-1] + beats if self._beats else 0)
         self._stamps.append(stamp_ns)
         self.last_ns = stamp_ns
@@ -62,7 +63,7 @@ class FrameClock:
 
     @property
     def _smooth_ns(self) -> float:
-        return self.last_ns + self._behind_ns
+        return (self.last_ns or 0) + self._behind_ns
 
     def _beats_since_last(self, stamp_ns: int) -> int | None:
         """Count the periods since the last frame; None where the count starts anew."""
@@ -83,7 +84,7 @@ class FrameClock:
         if len(self._stamps) < _FEWEST:
             return
         # Relative to the newest, because nanoseconds since 1970 do not fit a float.
-        times = [stamp - self.last_ns for stamp in self._stamps]
+        times = [stamp - self._stamps[-1] for stamp in self._stamps]
         gaps = [later - former for former, later in pairwise(times)]
         line = _fit(self._beats, times)
         if line.jitter > _DOUBTFUL * line.period:

@@ -99,8 +99,9 @@ class FramePairing:
     @property
     def spread_ns(self) -> int:
         """How far apart the newest stamps of the cameras lie; 0 before all have one."""
-        newest = [track.clock.last_ns for track in self._tracks.values()]
-        return 0 if None in newest else max(newest) - min(newest)
+        stamps = (track.clock.last_ns for track in self._tracks.values())
+        newest = [stamp_ns for stamp_ns in stamps if stamp_ns is not None]
+        return max(newest) - min(newest) if len(newest) == len(self._tracks) else 0
 
     def clear(self) -> None:
         """Forget what waits."""

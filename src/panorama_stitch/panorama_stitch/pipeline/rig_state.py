@@ -265,11 +265,13 @@ class RigState:
     ) -> tuple[list[View], bool, bool]:
         """Return the views of all cameras, whether they lead all around, and whether all fit."""
         surfaces, places = self.surfaces, [self._places[i] for i in range(len(self.cameras))]
-        seen = []
+        seen: list[np.ndarray | None] = []
         for camera, place, image in zip(self.cameras, places, images, strict=True):
             self.check(camera, image)
-            is_lens = not isinstance(place.source, Surface)
-            seen.append(None if is_lens else image > 0 if image.ndim == 2 else image.any(axis=2))
+            if not isinstance(place.source, Surface):
+                seen.append(None)
+            else:
+                seen.append(image > 0 if image.ndim == 2 else np.asarray(image.any(axis=2)))
         if not surfaces[0].yaw_is_column_shift:
             level = [
                 View(place.source, surface, place.interpolation, seen=shows, body=body)
@@ -399,7 +401,7 @@ def _set_by_hand(
     if attitude and measured.attitude:
         # What was measured says how both images lie; by hand they are only moved.
         level_px = measured.offset_y_px
-        moved = attitude_at(x_px, y_px - level_px, left, left, LEVEL)
+        moved = attitude_at(x_px, y_px - level_px, left, left, LEVEL) or LEVEL
         attitude = replace(attitude, pitch_rad=tilt.pitch_rad + moved.pitch_rad)
     return replace(
         measured,

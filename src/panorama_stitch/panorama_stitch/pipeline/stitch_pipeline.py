@@ -302,11 +302,14 @@ class StitchPipeline:
         living = [name for name in self.rig.cameras if name not in ages_s]
         if not ages_s or camera != living[0] or not self.rig.is_complete:
             return None
-        channels = self._stale.last(camera).shape[2:]
-        images = []
-        for name in self.rig.cameras:
-            last = self._stale.last(name)
-            images.append(self.rig.black(name, channels) if last is None else last)
+        last = {name: self._stale.last(name) for name in self.rig.cameras}
+        live = last[camera]
+        if live is None:
+            return None
+        images = [
+            self.rig.black(name, live.shape[2:]) if image is None else image
+            for name, image in last.items()
+        ]
         return _FrameSet(images, stamp_ns, ages_s)
 
     def _panorama(self, frames: _FrameSet) -> Panorama | None:
