@@ -13,7 +13,7 @@ help:
 
 build: install/.built ## set up what is missing, then build what has changed
 
-demo: build ## run two synthetic cameras to a panorama (RIG=folder: the pictures of a rig)
+demo: build ## run synthetic cameras to a panorama (RIG=ring4, ring3, tilted ..., or a folder of pictures)
 	@$(run) python tools/demo.py $(if $(RIG),--rig '$(RIG)') $(ARGS)
 
 view: build ## the same, live in a browser

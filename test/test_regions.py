@@ -170,9 +170,8 @@ def test_a_dual_fisheye_frame_becomes_a_closed_panorama(rig, watcher, real_data)
         START_S,
         'a closed panorama',
     )
+    wait_for(lambda: all(each.found for each in watcher.overlaps.overlaps), START_S, 'overlaps')
     there, back = watcher.overlaps.overlaps
-    assert there.found
-    assert back.found
     assert there.yaw_deg + back.yaw_deg == pytest.approx(360, abs=0.1)
     assert (there.pitch_deg, there.roll_deg) == pytest.approx(
         (back.pitch_deg, back.roll_deg), abs=NOMINAL_DEG

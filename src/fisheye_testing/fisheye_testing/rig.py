@@ -121,16 +121,17 @@ class RigProcesses:
         **capture: object,
     ) -> None:
         """Start a whole rig: `cameras` of `camera_parameters`, `capture` for both captures."""
+        shared = {'cameras': f'[{", ".join(cameras)}]'}
         if composed:
             own = {
                 f'{s}.{name}': v for s, entries in cameras.items() for name, v in entries.items()
             }
-            self.start('panorama', prefix, **own, **capture)
+            self.start('panorama', prefix, **shared, **own, **capture)
             return
         for side, entries in cameras.items():
             self.start(f'{side}/capture', prefix, **entries, **capture)
             self.start(f'{side}/undistort', prefix)
-        self.start('stitch', prefix)
+        self.start('stitch', prefix, **shared)
 
     def stop(self, node: str, with_signal: signal.Signals = signal.SIGINT) -> tuple[int, float]:
         """End a node; give its exit code and how long it took, s."""
