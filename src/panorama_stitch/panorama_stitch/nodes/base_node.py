@@ -39,8 +39,9 @@ from panorama_stitch.pipeline.metrics import (
     metrics,
     unpaired_sentence,
 )
+from panorama_stitch.pipeline.panorama import Panorama
 from panorama_stitch.pipeline.panorama_settings import MountSettings, PanoramaOutputSettings
-from panorama_stitch.pipeline.stitch_pipeline import Panorama, StitchPipeline
+from panorama_stitch.pipeline.stitch_pipeline import StitchPipeline
 
 FRAME_ID = 'panorama_optical_frame'
 _LATENCIES = 300

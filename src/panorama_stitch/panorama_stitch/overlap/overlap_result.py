@@ -1,9 +1,9 @@
 """What overlap calibration finds out about two neighbouring cameras."""
 
 from dataclasses import dataclass, replace
-from math import atan2, nan, tan
+from math import atan2, isnan, nan, tan
 
-from fisheye_geometry.attitude import Attitude
+from fisheye_geometry.attitude import LEVEL, Attitude
 from fisheye_geometry.surface import Surface
 from panorama_stitch.overlap.particles import Particle
 
@@ -143,4 +143,34 @@ def with_offset(
         offset_x_px=x_px,
         offset_y_px=horizons_px[0] - horizons_px[1],
         overlap_px=max(0.0, min(left.width - x_px, right.width)),
+    )
+
+
+def overlap_by_hand(
+    measured: Overlap, x_px: float, y_px: float, left: Surface, right: Surface
+) -> Overlap:
+    """Return an overlap with an offset that a person set; NaN leaves a part as it was measured."""
+    if isnan(x_px) and isnan(y_px):
+        return measured
+    x_px = measured.offset_x_px if isnan(x_px) else x_px
+    if isnan(y_px):
+        y_px = measured.offset_y_px
+    elif measured.attitude is None:
+        y_px = float(y_px)
+    found = measured.found or x_px != measured.offset_x_px
+    tilt = measured.attitude or LEVEL
+    attitude = attitude_at(x_px, y_px, left, right, tilt) if found else None
+    if attitude and measured.attitude:
+        # What was measured says how both images lie; by hand they are only moved.
+        level_px = measured.offset_y_px
+        moved = attitude_at(x_px, y_px - level_px, left, left, LEVEL) or LEVEL
+        attitude = replace(attitude, pitch_rad=tilt.pitch_rad + moved.pitch_rad)
+    return replace(
+        measured,
+        method='manual',
+        found=found,
+        offset_x_px=x_px,
+        offset_y_px=y_px,
+        attitude=attitude,
+        message='set by hand',
     )

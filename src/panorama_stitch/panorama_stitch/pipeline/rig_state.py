@@ -1,14 +1,13 @@
 """What is known of the rig: what each camera shows, how it is mounted, and what was measured."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import isnan, nan, radians
-from threading import Lock
 
 import numpy as np
 
-from fisheye_core.errors import FisheyeError, ImageFormatError, OverlapError
-from fisheye_geometry.attitude import LEVEL, Attitude, rotation_matrix
+from fisheye_core.errors import OverlapError
+from fisheye_geometry.attitude import Attitude, rotation_matrix
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.level import Mount
 from fisheye_geometry.rig import Pair, pairs_of, unwrapped
@@ -16,17 +15,17 @@ from fisheye_geometry.rig_solution import RigSolution, solve_rig
 from fisheye_geometry.surface import Surface
 from panorama_stitch.compose.build import Style, build_compositor
 from panorama_stitch.compose.compositor import Compositor
-from panorama_stitch.compose.mask import read_mask
 from panorama_stitch.compose.placing import leads_around
 from panorama_stitch.compose.posing import views_at_overlaps, views_of_rig
 from panorama_stitch.compose.view import View
-from panorama_stitch.overlap.methods import METHODS, CameraView, PairInput
+from panorama_stitch.overlap.methods import METHODS, PairInput
 from panorama_stitch.overlap.overlap_result import (
     Overlap,
-    attitude_at,
+    overlap_by_hand,
     side_by_side,
     with_offset,
 )
+from panorama_stitch.pipeline.known_cameras import KnownCameras
 from panorama_stitch.pipeline.panorama_settings import PanoramaOutputSettings
 
 Images = Sequence[np.ndarray]
@@ -38,17 +37,13 @@ _CLOSING_RAD = radians(10.0)
 """How far the closing rotation of a ring may be from what the others leave for it."""
 
 
-class RigState:
+class RigState(KnownCameras):
     """What each camera shows, the overlaps between neighbours, and the compositor that follows.
 
     Attributes
     ----------
-    cameras
-        Names from left to right.
     overlaps
         One for each of `pairs` as measured or read; None before.
-    faults
-        For each camera what is wrong with what was said of it, a sentence.
     gravity
         Where things fall in the frame of the robot, (3,) with x right, y down, z ahead; None
         while that is not known.
@@ -72,20 +67,10 @@ class RigState:
             Of each the image that is white where it sees the robot itself; '' for none, () for
             none of them.
         """
-        self.cameras = tuple(cameras)
+        super().__init__(cameras, mask_files)
         self.overlaps: list[Overlap] | None = None
         self.gravity: np.ndarray | None = None
         self._mounts = tuple(mounts) or (Mount(),) * len(self.cameras)
-        self._mask_files = tuple(mask_files) or ('',) * len(self.cameras)
-        self._bodies: list[np.ndarray | None] = [None] * len(self.cameras)
-        self.faults: dict[str, str] = {}
-        self._places: dict[int, _Place] = {}
-        self._lock = Lock()
-
-    @property
-    def is_complete(self) -> bool:
-        """Whether it is known what every camera sees."""
-        return len(self._places) == len(self.cameras)
 
     @property
     def pairs(self) -> tuple[Pair, ...]:
@@ -93,43 +78,19 @@ class RigState:
         is_closed = self.overlaps is not None and len(self.overlaps) == len(self.cameras) > 1
         return pairs_of(len(self.cameras), is_closed)
 
-    @property
-    def surfaces(self) -> list[Surface]:
-        """What the corrected images show, all with the focal length of the first."""
-        return [surface for _, surface in sorted(_with_one_focal(self._places).items())]
-
-    @property
-    def camera_views(self) -> list[CameraView]:
-        """What the images of each camera show."""
-        return [
-            CameraView(self._places[index].source, surface, self._bodies[index])
-            for index, surface in enumerate(self.surfaces)
-        ]
-
     def place(
         self, camera: str, source: Lens | Surface, surface: Surface, interpolation: str = 'linear'
     ) -> bool:
-        """Set what a camera's images show; return whether that is news.
+        """Set what a camera's images show, as `KnownCameras`.
 
         Overlaps that were measured on other surfaces are forgotten.
-
-        Raises
-        ------
-        GeometryError
-            If there is no surface with the focal length of the first camera; the former place
-            stays.
         """
-        index, place = self.cameras.index(camera), _Place(source, surface, interpolation)
-        former = self._places.get(index)
-        if place == former:
-            return False
-        _with_one_focal({**self._places, index: place})
-        with self._lock:
-            self._places[index] = place
-            self._bodies[index] = self._body(index, source)
-            if former and former.surface != surface:
+        former = self.places.get(self.cameras.index(camera))
+        is_news = super().place(camera, source, surface, interpolation)
+        if former and former.surface != surface:
+            with self._lock:
                 self.overlaps = None
-        return True
+        return is_news
 
     def set_overlaps(self, overlaps: list[Overlap], surfaces: list[Surface]) -> bool:
         """Use overlaps if the surfaces that they were measured on are still in use; whether so."""
@@ -138,24 +99,6 @@ class RigState:
             if is_current:
                 self.overlaps = overlaps
         return is_current
-
-    def has_camera(self, camera: str) -> bool:
-        """Whether it is known what a camera sees."""
-        return self.cameras.index(camera) in self._places
-
-    def check(self, camera: str, image: np.ndarray) -> None:
-        """Raise an `ImageFormatError` for an image of another size than the camera's."""
-        place = self._places.get(self.cameras.index(camera))
-        if place and image.shape[:2] != (place.source.height, place.source.width):
-            raise ImageFormatError(
-                f'the picture of {camera} has {image.shape[1]}x{image.shape[0]} px; '
-                f'expected {place.source.width}x{place.source.height} px'
-            )
-
-    def black(self, camera: str, channels: tuple[int, ...]) -> np.ndarray:
-        """Return an image for a camera that never gave one, (height, width, *channels) uint8."""
-        source = self._places[self.cameras.index(camera)].source
-        return np.zeros((source.height, source.width, *channels), np.uint8)
 
     def measure(
         self, frame_sets: Sequence[Images], settings: PanoramaOutputSettings, method: str
@@ -212,7 +155,7 @@ class RigState:
             for values in (settings.offset_x_px, settings.offset_y_px)
         ]
         return [
-            _set_by_hand(overlap, x_px, y_px, surfaces[pair.left], surfaces[pair.right])
+            overlap_by_hand(overlap, x_px, y_px, surfaces[pair.left], surfaces[pair.right])
             for overlap, pair, x_px, y_px in zip(measured, pairs, *by_hand, strict=True)
         ]
 
@@ -264,7 +207,7 @@ class RigState:
         self, overlaps: Sequence[Overlap], settings: PanoramaOutputSettings, images: Images
     ) -> tuple[list[View], bool, bool]:
         """Return the views of all cameras, whether they lead all around, and whether all fit."""
-        surfaces, places = self.surfaces, [self._places[i] for i in range(len(self.cameras))]
+        surfaces, places = self.surfaces, [self.places[i] for i in range(len(self.cameras))]
         seen: list[np.ndarray | None] = []
         for camera, place, image in zip(self.cameras, places, images, strict=True):
             self.check(camera, image)
@@ -276,7 +219,7 @@ class RigState:
             level = [
                 View(place.source, surface, place.interpolation, seen=shows, body=body)
                 for place, surface, shows, body in zip(
-                    places, surfaces, seen, self._bodies, strict=True
+                    places, surfaces, seen, self.bodies, strict=True
                 )
             ]
             views = views_at_overlaps(level, overlaps[: len(level) - 1])
@@ -287,7 +230,7 @@ class RigState:
             surfaces,
             interpolation=places[0].interpolation,
             seen=seen,
-            bodies=self._bodies,
+            bodies=self.bodies,
         )
         wraps = settings.ring != 'open' and not rig.apart and leads_around(views)
         return views, wraps, not rig.apart
@@ -296,7 +239,7 @@ class RigState:
         count = len(self.cameras)
         rotations = [_rotation(overlap, settings) for overlap in overlaps]
         return solve_rig(
-            [(name, self._places[i].source) for i, name in enumerate(self.cameras)],
+            [(name, self.places[i].source) for i, name in enumerate(self.cameras)],
             rotations[: count - 1],
             closing=rotations[count - 1] if len(rotations) == count else None,
             mounts=self._mounts,
@@ -350,68 +293,6 @@ class RigState:
                 with_offset(overlap, surfaces[pair.left], surfaces[pair.right], attitudes)
             )
         return result
-
-    def _body(self, index: int, source: Lens | Surface) -> np.ndarray | None:
-        """Read where a camera sees the robot itself; None where that is not known."""
-        camera, path = self.cameras[index], self._mask_files[index]
-        self.faults.pop(camera, None)
-        if not path:
-            return None
-        try:
-            return read_mask(path, source.width, source.height)
-        except FisheyeError as error:
-            self.faults[camera] = f'{error}; nothing is masked'
-            return None
-
-
-@dataclass(frozen=True)
-class _Place:
-    """What a camera's images show, and how they are drawn on which surface."""
-
-    source: Lens | Surface
-    surface: Surface
-    interpolation: str
-
-
-def _with_one_focal(places: dict[int, _Place]) -> dict[int, Surface]:
-    """Return the surface of each place, enlarged or reduced to the focal length of the first."""
-    surfaces = {index: place.surface for index, place in places.items()}
-    if 0 not in surfaces:
-        return surfaces
-    focal_px = surfaces[0].focal_px
-    return {
-        index: surface if surface.focal_px == focal_px else surface.with_focal(focal_px)
-        for index, surface in surfaces.items()
-    }
-
-
-def _set_by_hand(
-    measured: Overlap, x_px: float, y_px: float, left: Surface, right: Surface
-) -> Overlap:
-    if isnan(x_px) and isnan(y_px):
-        return measured
-    x_px = measured.offset_x_px if isnan(x_px) else x_px
-    if isnan(y_px):
-        y_px = measured.offset_y_px
-    elif measured.attitude is None:
-        y_px = float(y_px)
-    found = measured.found or x_px != measured.offset_x_px
-    tilt = measured.attitude or LEVEL
-    attitude = attitude_at(x_px, y_px, left, right, tilt) if found else None
-    if attitude and measured.attitude:
-        # What was measured says how both images lie; by hand they are only moved.
-        level_px = measured.offset_y_px
-        moved = attitude_at(x_px, y_px - level_px, left, left, LEVEL) or LEVEL
-        attitude = replace(attitude, pitch_rad=tilt.pitch_rad + moved.pitch_rad)
-    return replace(
-        measured,
-        method='manual',
-        found=found,
-        offset_x_px=x_px,
-        offset_y_px=y_px,
-        attitude=attitude,
-        message='set by hand',
-    )
 
 
 def _rotation(overlap: Overlap, settings: PanoramaOutputSettings) -> np.ndarray | None:

@@ -7,7 +7,6 @@ published. Nothing here calls back: whoever owns the pipeline asks it.
 
 from collections.abc import Sequence
 from concurrent.futures import Future, wait
-from dataclasses import dataclass
 from threading import Lock
 from time import monotonic, monotonic_ns
 from typing import NamedTuple
@@ -25,10 +24,11 @@ from panorama_stitch.overlap.overlap_result import Overlap
 from panorama_stitch.pipeline.compositor_builder import CompositorBuilder
 from panorama_stitch.pipeline.economy import Economy
 from panorama_stitch.pipeline.pairing import FramePairing
+from panorama_stitch.pipeline.panorama import Panorama
 from panorama_stitch.pipeline.panorama_settings import MountSettings, PanoramaOutputSettings
 from panorama_stitch.pipeline.rig_state import RigState
 from panorama_stitch.pipeline.seam_watch import SeamWatch
-from panorama_stitch.pipeline.stale import StaleCameras, write_age
+from panorama_stitch.pipeline.stale import StaleCameras
 
 _GRAVITY_RAD = np.radians(0.5)
 """A panorama is levelled anew when gravity has turned by more."""
@@ -51,53 +51,6 @@ class _FrameSet(NamedTuple):
     images: Sequence[np.ndarray]
     stamp_ns: int
     ages_s: dict[str, float]
-
-
-@dataclass(frozen=True, eq=False)
-class Panorama:
-    """Frames that belong together and what draws them.
-
-    Attributes
-    ----------
-    compositor
-        Draws them.
-    images
-        One of each camera, stale ones dimmed.
-    stamp_ns
-        When the oldest live one was taken.
-    encoding
-        Of the images and of the panorama.
-    stale
-        For each camera that is not live the columns [begin, end) that show it, and its age, s.
-    is_economical
-        Whether there is no time for all that blends can do.
-    """
-
-    compositor: Compositor
-    images: Sequence[np.ndarray]
-    stamp_ns: int
-    encoding: str
-    stale: dict[str, tuple[tuple[int, int], float]]
-    is_economical: bool = False
-
-    @property
-    def surface(self) -> Surface:
-        """What the panorama shows."""
-        return self.compositor.layout.surface
-
-    def draw(self, out: np.ndarray) -> None:
-        """Draw into `out`, (surface.height, surface.width[, 3]) uint8.
-
-        Raises
-        ------
-        ImageFormatError
-            If an image is not of the size that its camera is known to give.
-        """
-        self.compositor.compose(
-            self.images, out, are_live=not self.stale, economical=self.is_economical
-        )
-        for camera, (columns, age_s) in self.stale.items():
-            write_age(out, columns, camera, age_s)
 
 
 class StitchPipeline:

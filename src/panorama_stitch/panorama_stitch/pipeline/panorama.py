@@ -1,0 +1,57 @@
+"""A panorama that is about to be drawn: frames that belong together and what draws them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fisheye_geometry.surface import Surface
+from panorama_stitch.compose.compositor import Compositor
+from panorama_stitch.pipeline.stale import write_age
+
+
+@dataclass(frozen=True, eq=False)
+class Panorama:
+    """Frames that belong together and what draws them.
+
+    Attributes
+    ----------
+    compositor
+        Draws them.
+    images
+        One of each camera, stale ones dimmed.
+    stamp_ns
+        When the oldest live one was taken.
+    encoding
+        Of the images and of the panorama.
+    stale
+        For each camera that is not live the columns [begin, end) that show it, and its age, s.
+    is_economical
+        Whether there is no time for all that blends can do.
+    """
+
+    compositor: Compositor
+    images: Sequence[np.ndarray]
+    stamp_ns: int
+    encoding: str
+    stale: dict[str, tuple[tuple[int, int], float]]
+    is_economical: bool = False
+
+    @property
+    def surface(self) -> Surface:
+        """What the panorama shows."""
+        return self.compositor.layout.surface
+
+    def draw(self, out: np.ndarray) -> None:
+        """Draw into `out`, (surface.height, surface.width[, 3]) uint8.
+
+        Raises
+        ------
+        ImageFormatError
+            If an image is not of the size that its camera is known to give.
+        """
+        self.compositor.compose(
+            self.images, out, are_live=not self.stale, economical=self.is_economical
+        )
+        for camera, (columns, age_s) in self.stale.items():
+            write_age(out, columns, camera, age_s)
