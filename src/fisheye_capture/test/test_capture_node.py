@@ -237,10 +237,9 @@ def test_without_a_calibration_k_is_zero_and_it_is_said(ros, write_picture):
     info = ros.hear('/left/camera_info')
     assert (info.width, info.height, any(info.k)) == (32, 24, False)
     status = ros.hear('/diagnostics').status[0]
-    assert (status.level, status.message) == (
-        DiagnosticStatus.WARN,
-        'the camera is not calibrated',
-    )
+    assert status.level == DiagnosticStatus.WARN
+    # A busy machine may have shed pictures, too.
+    assert status.message.split(';')[0] == 'the camera is not calibrated'
 
 
 def test_a_calibration_file_is_published(ros, write_picture, tmp_path):
