@@ -13,6 +13,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from known_rigs import synthetic_rig
 from selenium import webdriver
 from selenium.webdriver import ActionChains, Keys
 
@@ -36,6 +37,16 @@ SURFACES = [
     Surface('equirectangular', 1300, 480, 240.0, 640.0, 240.0),
     Surface('rectilinear', 1200, 700, 420.0, 600.0, 330.0),
 ]
+CLOSED = [
+    Surface('cylindrical', 1508, 560, 1508 / math.tau, 753.5, 260.0),
+    Surface('equirectangular', 1507, 480, 1507 / math.tau, 753.0, 240.0),
+]
+BEHIND_DEG = 180.0
+"""Where the edges of a closed panorama meet."""
+WAVES = 125
+"""Around a closed panorama: 12 pixels each."""
+BACKGROUND = 27, 21, 16
+"""Of the page, blue, green and red."""
 MAGENTA, GREEN = (255, 0, 255), (0, 255, 0)
 
 
@@ -94,6 +105,23 @@ class Page:
         ).perform()
         return float(self.find('bearing').get_attribute('data-bearing-deg'))
 
+    @property
+    def bearing_deg(self):
+        """Bearing of the middle of the view, or of what is under the pointer."""
+        return float(self.find('bearing').get_attribute('data-bearing-deg') or 'nan')
+
+    def look_at(self, bearing_deg):
+        """Turn to the right by arrow keys until the view's middle is about there."""
+        while abs(aside_deg(self.bearing_deg, bearing_deg)) > 3:
+            self.turn()
+
+    def turn(self):
+        """Turn a step to the right; return by how much, deg."""
+        before_deg = self.bearing_deg
+        self.press(Keys.ARROW_RIGHT)
+        self.until(lambda: self.bearing_deg != before_deg, 'a turn')
+        return aside_deg(self.bearing_deg, before_deg)
+
     def until(self, condition, what):
         return wait_for(condition, DEADLINE_S, what)
 
@@ -103,7 +131,7 @@ def serve():
     """Return a function that shows one picture over and over, until `stop` is called."""
     ended, faults = [], []
 
-    def start(surface, image, **settings):
+    def start(surface, image, wraps=False, **settings):
         measured = Future()
         measured.set_result('measured anew')
         server = ViewerServer(
@@ -113,7 +141,8 @@ def serve():
             report=lambda sentence, trace: faults.append(trace),
         )
         server.start()
-        server.tell(projection=described(surface), rate_hz=10.0, delay_ms=20, problems=[])
+        projection = described(surface, wraps)
+        server.tell(projection=projection, rate_hz=10.0, delay_ms=20, problems=[])
         jpeg = cv2.imencode('.jpg', image, (cv2.IMWRITE_JPEG_QUALITY, 95))[1].tobytes()
         silent = threading.Event()
 
@@ -153,6 +182,11 @@ def attackers():
     for process in processes:
         process.kill()
         process.communicate()
+
+
+def aside_deg(bearing_deg, other_deg):
+    """Return how far right of another bearing one is, the short way round."""
+    return (bearing_deg - other_deg + 180) % 360 - 180
 
 
 def painted(surface, bearing_deg, height_deg):
@@ -254,6 +288,71 @@ def test_straight_things_are_straight_when_one_looks_around(browser, serve, surf
 def bar_height(bar):
     """Half the bar's own height, px."""
     return max(np.ptp(bar[bar[:, 0] == column, 1]) for column in np.unique(bar[:, 0])) / 2
+
+
+@pytest.mark.parametrize('surface', CLOSED, ids=lambda surface: surface.kind)
+@pytest.mark.parametrize('bearing_deg', [-176.0, BEHIND_DEG, 175.0])
+def test_bearings_are_right_across_the_edge_of_a_closed_panorama(
+    browser, serve, surface, bearing_deg
+):
+    server = serve(surface, painted(surface, bearing_deg, 12.0), wraps=True)
+    page = Page(browser, server.url)
+    patch(page, 'whole', MAGENTA)
+    page.look_at(BEHIND_DEG)
+    spot = patch(page, 'look', MAGENTA)
+    assert np.ptp(spot, axis=0) == pytest.approx(2 * SPOT_DEG * 450 / 57.3, abs=4), 'one, whole'
+    shown_deg = page.point('look', *spot.mean(axis=0))
+    assert aside_deg(shown_deg, bearing_deg) == pytest.approx(0, abs=CLOSE_DEG)
+
+
+@pytest.mark.parametrize('surface', CLOSED, ids=lambda surface: surface.kind)
+def test_nothing_is_seen_of_the_edges_of_a_closed_panorama(browser, serve, surface):
+    # Steepest at the edge, where a step would be the largest.
+    around = (np.arange(surface.width) + 0.5) / surface.width
+    waves = 128 + 90 * np.sin(math.tau * WAVES * around)
+    image = np.broadcast_to(waves[:, None], (surface.height, surface.width, 3)).astype(np.uint8)
+    server = serve(surface, image, wraps=True)
+    page = Page(browser, server.url)
+    page.until(lambda: page.text('condition') == 'Live', 'a live picture')
+    page.look_at(BEHIND_DEG)
+    page.press('+' * 20)
+    page.until(lambda: np.ptp(page.shot('look')[200]) > 100, 'a picture')
+    row = page.shot('look')[200].astype(int)
+    assert abs(np.diff(row, axis=0)).max() < 15, 'neither a gap nor a step of one pixel'
+
+
+def test_one_turns_without_end_on_a_closed_panorama_only(browser, serve):
+    server = serve(CLOSED[0], painted(CLOSED[0], 0, 0), wraps=True)
+    page = Page(browser, server.url)
+    page.until(lambda: page.text('condition') == 'Live', 'a live picture')
+    turns_deg = [page.turn() for _ in range(45)]
+    assert sum(turns_deg) > 400
+    assert np.ptp(turns_deg) < 0.1
+    # The same picture, not closed, has ends.
+    server.tell(projection=described(CLOSED[0]))
+    page.press(Keys.ARROW_RIGHT * 45)
+    page.until(lambda: page.bearing_deg == pytest.approx(180, abs=CLOSE_DEG), 'the right end')
+    page.press(Keys.ARROW_LEFT * 45)
+    page.until(lambda: page.bearing_deg == pytest.approx(-180, abs=CLOSE_DEG), 'the left end')
+
+
+def test_the_map_of_a_closed_panorama_leads_across_its_edge(browser, serve):
+    server = serve(CLOSED[0], np.full((560, 1508, 3), 90, np.uint8), wraps=True)
+    page = Page(browser, server.url)
+    page.until(lambda: page.text('condition') == 'Live', 'a live picture')
+    page.look_at(BEHIND_DEG)
+
+    def outlined():
+        lines = (page.shot('map').min(axis=2) > 140).sum(axis=0)
+        middle = len(lines) // 2
+        sides = *lines[2:30], *lines[-30:-2]
+        return min(sides) >= 2 and not lines[middle - 60 : middle + 60].any()
+
+    page.until(outlined, 'an outline that leaves at one edge and comes in at the other')
+    width, height = (page.find('map').size[name] for name in ('width', 'height'))
+    for x in (1, width - 1):
+        shown_deg = page.point('map', x, height / 2)
+        assert aside_deg(shown_deg, BEHIND_DEG) == pytest.approx(0, abs=2 * CLOSE_DEG)
 
 
 def test_a_picture_that_stands_still_is_seen_to(browser, serve):
@@ -375,15 +474,34 @@ def moves(before, after):
     return before.shape == after.shape and abs(before.astype(int) - after).max() > 100
 
 
-def test_the_whole_rig_in_a_browser(browser, rig, watcher):
-    rig.start_all(False, camera_parameters(None), frame_rate_hz=10.0)
+def page_of(rig, browser):
+    """Start the viewer beside a rig and open its page."""
     rig.start('viewer', port=0)
     said = wait_for(
         lambda: rig.check_alive() or re.search(r'http://\S+', rig.log('viewer').read_text()),
         DEADLINE_S,
         'the address',
     )
-    page = Page(browser, said[0])
+    return Page(browser, said[0])
+
+
+def test_one_looks_straight_back_in_a_ring_of_cameras(browser, rig):
+    ring = synthetic_rig('ring3')
+    rig.start_all(True, ring.cameras, **ring.common, frame_rate_hz=5.0)
+    page = page_of(rig, browser)
+    page.until(lambda: re.match(r'[01]\.\d\d, .*, [01]\.\d\d', page.text('overlap')), 'a ring')
+    page.until(lambda: page.text('condition').startswith('Live'), 'a live picture')
+    assert page.find('overlap').get_attribute('title').count('° apart') == 3
+    page.look_at(BEHIND_DEG)
+    page.look_at(-90.0)
+    page.look_at(BEHIND_DEG)
+    background = abs(page.shot('look')[150:250].astype(int) - BACKGROUND).max(axis=2) < 2
+    assert not background.all(axis=0).any(), 'no column is empty'
+
+
+def test_the_whole_rig_in_a_browser(browser, rig, watcher):
+    rig.start_all(False, camera_parameters(None), frame_rate_hz=10.0)
+    page = page_of(rig, browser)
     page.until(lambda: re.match(r'[01]\.\d\d', page.text('overlap')), 'an overlap')
     page.until(lambda: page.text('condition').startswith('Live'), 'a live picture')
     page.until(lambda: moves(page.shot('whole'), page.shot('whole')), 'a movement')

@@ -23,6 +23,8 @@ FORMATS = {'png': '.png', 'gpano': '.jpg'}
 
 _SUFFIXES = ('.png', '.jpg', '.jpeg')
 _JPEG_QUALITY = 95
+_REACH_PX = 3
+"""What cubic interpolation needs beyond a pixel, and one for rounding."""
 _XMP_NAMESPACE = b'http://ns.adobe.com/xap/1.0/\0'
 _XMP = """<?xpacket begin="\ufeff" id="W5M0MpCehiHzreSzNTczkc9d"?>
 <x:xmpmeta xmlns:x="adobe:ns:meta/">
@@ -34,7 +36,14 @@ _XMP = """<?xpacket begin="\ufeff" id="W5M0MpCehiHzreSzNTczkc9d"?>
 <?xpacket end="r"?>"""
 
 
-def save(path: Path, form: str, image: np.ndarray, surface: Surface, stamp_ns: int) -> list[Path]:
+def save(
+    path: Path,
+    form: str,
+    image: np.ndarray,
+    surface: Surface,
+    stamp_ns: int,
+    wraps: bool = False,
+) -> list[Path]:
     """Save a panorama.
 
     Parameters
@@ -50,6 +59,8 @@ def save(path: Path, form: str, image: np.ndarray, surface: Surface, stamp_ns: i
         What the panorama shows.
     stamp_ns
         When it was taken, ns since 1970.
+    wraps
+        Whether its right edge meets its left one.
 
     Returns
     -------
@@ -66,12 +77,12 @@ def save(path: Path, form: str, image: np.ndarray, surface: Surface, stamp_ns: i
     name = path.stem if path.suffix.lower() in _SUFFIXES else path.name
     path = path.with_name(name + FORMATS[form])
     if form == 'gpano':
-        return [_write(path, gpano(image, surface))]
+        return [_write(path, gpano(image, surface, wraps))]
     description = {
         'image': path.name,
         'stamp_ns': stamp_ns,
         'taken': datetime.fromtimestamp(stamp_ns / 1e9, timezone.utc).isoformat(),
-        'projection': described(surface),
+        'projection': described(surface, wraps),
     }
     text = json.dumps(description, indent=2) + '\n'
     return [
@@ -80,11 +91,14 @@ def save(path: Path, form: str, image: np.ndarray, surface: Surface, stamp_ns: i
     ]
 
 
-def gpano(image: np.ndarray, surface: Surface) -> bytes:
+def gpano(image: np.ndarray, surface: Surface, wraps: bool = False) -> bytes:
     """Return an equirectangular JPEG of a panorama, with its GPano tags.
 
-    The tags are those of Google's Photo Sphere XMP Metadata.
+    The tags are those of Google's Photo Sphere XMP Metadata. One that `wraps` is all around the
+    sphere, without a gap at its edges.
     """
+    if wraps:
+        image, surface = _repeated(image, surface)
     sphere, left_px, top_px = on_sphere(surface)
     equirectangular = RemapTable(surface, sphere, 'cubic')(image)
     quality = (cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY)
@@ -101,6 +115,13 @@ def gpano(image: np.ndarray, surface: Surface) -> bytes:
         'CroppedAreaTopPixels': top_px,
     }
     return with_xmp(jpeg, tags)
+
+
+def _repeated(image: np.ndarray, surface: Surface) -> tuple[np.ndarray, Surface]:
+    """Repeat what is beyond the edges, so that 180 degrees to each side and more are there."""
+    beyond_px = ceil(abs(surface.center_x_px - (surface.width - 1) / 2)) + _REACH_PX
+    image = cv2.copyMakeBorder(image, 0, 0, beyond_px, beyond_px, cv2.BORDER_WRAP)
+    return image, surface.window(-beyond_px, 0, image.shape[1], surface.height)
 
 
 def on_sphere(surface: Surface) -> tuple[Surface, int, int]:

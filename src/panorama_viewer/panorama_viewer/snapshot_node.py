@@ -27,26 +27,29 @@ class SnapshotNode(Node):
     Attributes
     ----------
     taken : tuple or None
-        Image (height, width[, 3]) uint8, BGR or grey; its surface; its stamp, ns.
+        Image (height, width[, 3]) uint8, BGR or grey; its surface; its stamp, ns; whether its
+        edges meet.
     """
 
     def __init__(self, **kwargs):
         super().__init__('snapshot', **kwargs)
-        self.taken: tuple[np.ndarray, Surface, int] | None = None
+        self.taken: tuple[np.ndarray, Surface, int, bool] | None = None
         self._surface: Surface | None = None
+        self._wraps = False
         self.create_subscription(Projection, 'panorama/projection', self._place, LATCHED)
         self._image = ImageSubscription(self, 'panorama/image', self._take)
 
     def _place(self, message) -> None:
-        self._surface = surface_of(message)
+        self._surface, self._wraps = surface_of(message), message.wraps
 
     def _take(self, image, encoding, header) -> None:
         surface = self._surface
         # Behind a new projection there may still be a picture of the old one.
         if surface and image.shape[1::-1] == (surface.width, surface.height):
-            self.taken = to_opencv(image, encoding), surface, ns_of(header.stamp)
+            picture = to_opencv(image, encoding)
+            self.taken = picture, surface, ns_of(header.stamp), self._wraps
 
-    def wait(self, timeout_s: float) -> tuple[np.ndarray, Surface, int]:
+    def wait(self, timeout_s: float) -> tuple[np.ndarray, Surface, int, bool]:
         """Spin until a panorama was taken; a `SourceError` if none comes."""
         spin_until(self, lambda: self.taken is not None, timeout_s)
         if self.taken is None:

@@ -106,5 +106,10 @@ def measured(overlap: Mapping[str, Any]) -> str:
     pair = '{left} and {right}'.format(**overlap)
     if not overlap['found']:
         return f'{pair} show nothing in common'
-    apart = f', {overlap["offset_deg"]:.1f}° apart' if overlap['offset_deg'] is not None else ''
-    return f'{pair} overlap{apart} (confidence {overlap["confidence"]:.2f})'
+    yaw_deg, near_deg, confidence = (
+        overlap[name] for name in ('yaw_deg', 'near_deg', 'confidence')
+    )
+    apart = '' if yaw_deg is None else f', {yaw_deg:.1f}° apart'
+    near = f', near things up to {near_deg:.1f}° beside far ones' if near_deg else ''
+    known = 'not known' if confidence is None else f'{confidence:.2f}'
+    return f'{pair} overlap{apart}{near} (confidence {known})'

@@ -105,7 +105,7 @@ class ViewerNode(Node):
         except FisheyeError as error:
             self.get_logger().warning(f'panorama/projection refused: {error}')
             return
-        self._server.tell(projection=described(surface))
+        self._server.tell(projection=described(surface, message.wraps))
 
     def _take_overlaps(self, message) -> None:
         self._server.tell(overlaps=[_entry(overlap) for overlap in message.overlaps])
@@ -157,19 +157,20 @@ class ViewerNode(Node):
 
 def _entry(overlap: Overlap) -> dict[str, Any]:
     """Return what the page shows of an overlap; JSON has no NaN."""
-    numbers = {'confidence': overlap.confidence, 'offset_deg': overlap.offset_deg}
-    return {
+    numbers = {name: getattr(overlap, name) for name in ('confidence', 'yaw_deg', 'near_deg')}
+    entry = {
         'left': overlap.left_camera,
         'right': overlap.right_camera,
         'found': overlap.found,
         **{name: value if isfinite(value) else None for name, value in numbers.items()},
     }
+    return {**entry, 'words': measured(entry)}
 
 
 def _sentence(response: CalibrateOverlap.Response, is_saved: bool) -> str:
     if not response.success:
         return response.message
-    sentences = [measured(_entry(overlap)) for overlap in response.overlaps]
+    sentences = [_entry(overlap)['words'] for overlap in response.overlaps]
     if is_saved and all(overlap.found for overlap in response.overlaps):
         sentences.append('saved')
     return '; '.join(sentences)

@@ -19,7 +19,14 @@ SURFACES = [
 ]
 WHOLE = Surface('equirectangular', 1200, 500, 180.0, 600.0, 250.0)
 """Wider than the sphere."""
+CLOSED = [
+    Surface(kind, width, 300, width / (2 * np.pi), center_x_px, 140.0)
+    for kind in ('cylindrical', 'equirectangular')
+    for width, center_x_px in ((800, 399.5), (801, 400.0), (801, 250.0), (802, 400.5))
+]
 CLOSE_PX = 0.5
+CLOSE_GREY = 4
+"""JPEG, and one step of the waves to a sixteenth of a pixel."""
 STAMP_NS = 1_700_000_000_250_000_000
 
 
@@ -84,14 +91,34 @@ def test_the_part_lies_within_the_sphere_and_is_covered(surface):
     assert image[:, round(part.center_x_px)].min() > 150, 'no black rows'
 
 
+@pytest.mark.parametrize('surface', CLOSED, ids=lambda s: f'{s.kind} {s.width} {s.center_x_px}')
+def test_a_closed_panorama_is_all_around_the_sphere(surface):
+    def waves(bearing_rad):
+        return 128 + 90 * np.cos(20 * bearing_rad + 1)
+
+    columns = np.arange(surface.width)
+    row = waves((columns - surface.center_x_px) / surface.focal_px)
+    image = np.broadcast_to(row, (surface.height, surface.width)).astype(np.uint8)
+    jpeg = gpano(image, surface, wraps=True)
+    tags = xmp(jpeg)
+    full_px = int(tags['FullPanoWidthPixels'])
+    assert abs(full_px - surface.width) <= 1
+    assert int(tags['CroppedAreaImageWidthPixels']) == full_px
+    assert int(tags['CroppedAreaLeftPixels']) == 0
+    sphere = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_GRAYSCALE)
+    true = waves((np.arange(full_px) + 0.5) / full_px * 2 * np.pi - np.pi)
+    assert abs(sphere[len(sphere) // 2] - true).max() < CLOSE_GREY
+
+
 def test_a_png_has_its_projection_beside_it(tmp_path):
     surface = SURFACES[0]
     image = np.random.default_rng(1).integers(0, 255, (480, 1200, 3), np.uint8)
-    paths = save(tmp_path / 'new' / 'here.jpg', 'png', image, surface, STAMP_NS)
+    paths = save(tmp_path / 'new' / 'here.jpg', 'png', image, surface, STAMP_NS, True)
     assert paths == [tmp_path / 'new' / 'here.png', tmp_path / 'new' / 'here.json']
     np.testing.assert_array_equal(cv2.imread(str(paths[0])), image)
     described = json.loads(paths[1].read_text())
-    assert surface_of(Projection(**described['projection'])) == surface
+    message = Projection(**described['projection'])
+    assert (surface_of(message), message.wraps) == (surface, True)
     assert (described['image'], described['stamp_ns']) == ('here.png', STAMP_NS)
     assert described['taken'] == '2023-11-14T22:13:20.250000+00:00'
 

@@ -38,7 +38,7 @@ def test_a_panorama_is_taken_with_its_surface_and_any_stamp(context, stamp_ns):
     projection = stitching.create_publisher(Projection, 'panorama/projection', LATCHED)
     image = stitching.create_publisher(Image, 'panorama/image', IMAGE)
     header = Header(stamp=stamp_of(stamp_ns))
-    projection.publish(projection_of(SURFACE, header))
+    projection.publish(projection_of(SURFACE, header, wraps=True))
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
     buffer = ImageBuffer(SURFACE.width, SURFACE.height, 'rgb8')
@@ -49,9 +49,9 @@ def test_a_panorama_is_taken_with_its_surface_and_any_stamp(context, stamp_ns):
         executor.spin_once(timeout_sec=0.02)
         if node.taken:
             break
-    taken, surface, taken_ns = node.taken
+    taken, surface, taken_ns, wraps = node.taken
     np.testing.assert_array_equal(taken, PANORAMA)
-    assert (surface, taken_ns) == (SURFACE, stamp_ns)
+    assert (surface, taken_ns, wraps) == (SURFACE, stamp_ns, True)
     for ended in (node, stitching):
         ended.destroy_node()
 

@@ -70,13 +70,22 @@ def test_parts_have_plain_names(name, words):
 
 
 @pytest.mark.parametrize(
-    ('found', 'offset_deg', 'words'),
+    ('found', 'yaw_deg', 'near_deg', 'confidence', 'words'),
     [
-        (True, 140.23, 'left and right overlap, 140.2° apart (confidence 0.95)'),
-        (True, None, 'left and right overlap (confidence 0.95)'),
-        (False, None, 'left and right show nothing in common'),
+        (True, 140.23, 0.0, 0.95, 'left and right overlap, 140.2° apart (confidence 0.95)'),
+        (
+            True,
+            140.23,
+            2.34,
+            0.95,
+            'left and right overlap, 140.2° apart, near things up to 2.3° beside far ones '
+            '(confidence 0.95)',
+        ),
+        (True, None, 0.0, 0.95, 'left and right overlap (confidence 0.95)'),
+        (True, 140.23, None, None, 'left and right overlap, 140.2° apart (confidence not known)'),
+        (False, None, 0.0, 0.2, 'left and right show nothing in common'),
     ],
 )
-def test_a_calibration_is_told_in_plain_words(found, offset_deg, words):
-    overlap = {'left': 'left', 'right': 'right', 'found': found, 'confidence': 0.95}
-    assert measured({**overlap, 'offset_deg': offset_deg}) == words
+def test_a_calibration_is_told_in_plain_words(found, yaw_deg, near_deg, confidence, words):
+    overlap = {'left': 'left', 'right': 'right', 'found': found, 'confidence': confidence}
+    assert measured({**overlap, 'yaw_deg': yaw_deg, 'near_deg': near_deg}) == words

@@ -5,7 +5,7 @@ import json
 import threading
 import time
 from array import array
-from math import nan
+from math import nan, tau
 
 import aiohttp
 import pytest
@@ -141,10 +141,23 @@ def test_pictures_go_to_the_browser_as_they_are_and_only_while_one_looks(ros):
 def test_the_page_is_told_what_the_rig_says(ros):
     stitching, node = Stitching(ros.context), viewer(ros, port=0)
     stitching.projection.publish(
-        Projection(surface='cylindrical', width=800, height=300, focal_px=160.0, center_x_px=399.5)
+        Projection(
+            surface='cylindrical',
+            width=1000,
+            height=300,
+            focal_px=1000 / tau,
+            center_x_px=499.5,
+            wraps=True,
+        )
     )
     overlaps = [
-        Overlap(left_camera='left', right_camera='right', found=True, confidence=confidence)
+        Overlap(
+            left_camera='left',
+            right_camera='right',
+            found=True,
+            yaw_deg=120.0,
+            confidence=confidence,
+        )
         for confidence in (0.9, nan)
     ]
     stitching.overlap.publish(Overlaps(overlaps=overlaps))
@@ -163,9 +176,11 @@ def test_the_page_is_told_what_the_rig_says(ros):
 
     told = visit(hear)
     assert told['projection']['surface'] == 'cylindrical'
-    assert told['projection']['focal_px'] == 160.0
+    assert told['projection']['focal_px'] == 1000 / tau
+    assert told['projection']['wraps'] is True
     # JSON has no NaN, and a browser would refuse it.
     assert [overlap['confidence'] for overlap in told['overlaps']] == [0.9, None]
+    assert 'left and right overlap, 120.0° apart' in told['overlaps'][0]['words']
     assert [problem['text'] for problem in told['problems']] == ['Left camera: unplugged']
     assert told['skew_ms'] == 2.5
     assert 0 <= told['delay_ms'] < 1000 * DEADLINE_S
@@ -224,7 +239,8 @@ def test_the_button_has_the_overlap_measured(ros, save):
                 left_camera='left',
                 right_camera='right',
                 found=True,
-                offset_deg=140.2,
+                yaw_deg=140.2,
+                near_deg=2.1,
                 confidence=0.9,
             )
         ]
@@ -232,7 +248,10 @@ def test_the_button_has_the_overlap_measured(ros, save):
 
     stitching.create_service(CalibrateOverlap, 'calibrate_overlap', calibrate)
     ros.start(stitching, node)
-    words = 'left and right overlap, 140.2° apart (confidence 0.90)' + '; saved' * save
+    words = (
+        'left and right overlap, 140.2° apart, near things up to 2.1° beside far ones '
+        '(confidence 0.90)' + '; saved' * save
+    )
     wait_for(lambda: press_calibrate(node) == (200, words))
 
 

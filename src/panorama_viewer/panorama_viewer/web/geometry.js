@@ -60,15 +60,16 @@ export class Projection {
     return anglesOf(this.ray(x, y));
   }
 
-  /** Bearings of the outer edges and angles of the lower and upper ones. */
+  /** Bearings of the outer edges, infinite where there are none; angles of the other two. */
   get limits() {
-    const [left] = this.angles(-0.5, this.center_y_px);
-    const [right] = this.angles(this.width - 0.5, this.center_y_px);
     const [, top] = this.angles(this.center_x_px, -0.5);
     const [, bottom] = this.angles(this.center_x_px, this.height - 0.5);
-    const beyond = (edge_px) => Math.abs(edge_px - this.center_x_px) >= Math.PI * this.focal_px;
-    const round = this.kind.columnsAreBearings && beyond(-0.5) && beyond(this.width - 0.5);
-    return { left: round ? -Infinity : left, right: round ? Infinity : right, top, bottom };
+    if (this.wraps) return { left: -Infinity, right: Infinity, top, bottom };
+    const [left, right] = [-0.5, this.width - 0.5].map((edge_px) => {
+      if (!this.kind.columnsAreBearings) return this.angles(edge_px, this.center_y_px)[0];
+      return clamp((edge_px - this.center_x_px) / this.focal_px, -Math.PI, Math.PI);
+    });
+    return { left, right, top, bottom };
   }
 }
 

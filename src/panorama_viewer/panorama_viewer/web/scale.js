@@ -17,8 +17,8 @@ export class Scale {
     const { pen, canvas } = this;
     const width = canvas.clientWidth;
     const [low, high] = [limits.left, limits.right].map((limit) => limit / DEGREE);
-    const first = Math.ceil(Math.max(low, -180));
-    const last = Math.floor(Math.min(high, 179));
+    const first = Math.ceil(Math.max(low, -179));
+    const last = Math.floor(Math.min(high, 180));
     pen.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
     pen.clearRect(0, 0, width, canvas.clientHeight);
     const style = getComputedStyle(canvas);
@@ -30,6 +30,7 @@ export class Scale {
       const x = place(degrees * DEGREE);
       if (x !== null && x >= 0 && x <= width) ticks.push([degrees, x]);
     }
+    ticks.sort(([, x], [, other]) => x - other); // all around, 180° may be in the middle
     const step = STEPS.find((s) => gap(ticks, s) >= ROOM) ?? STEPS.at(-1);
     const fine = STEPS.find((s) => step % s === 0 && gap(ticks, s) >= 5) ?? step;
     pen.beginPath();
@@ -65,5 +66,6 @@ function gap(ticks, step) {
 
 function aside(degrees, negative, positive) {
   const rounded = Math.abs(degrees).toFixed(1);
-  return rounded === '0.0' ? '0.0°' : `${rounded}° ${degrees < 0 ? negative : positive}`;
+  if (rounded === '0.0' || rounded === '180.0') return `${rounded}°`; // on neither side
+  return `${rounded}° ${degrees < 0 ? negative : positive}`;
 }

@@ -59,6 +59,7 @@ export class Status {
     $('delay').textContent = isDead || delay_ms == null ? '–' : delay(delay_ms + way_ms);
     $('skew').textContent = skew == null ? '–' : `${skew.toFixed(0)} ms`;
     $('overlap').textContent = overlaps?.map(confidence).join(', ') || '–';
+    $('overlap').title = overlaps?.map(({ words }) => words).join('\n') ?? '';
   }
 
   problems(problems) {

@@ -17,20 +17,27 @@ export class Whole {
 
   outline(projection, view, ratio) {
     const { pen, canvas } = this;
-    const scale = canvas.width / projection.width;
-    pen.beginPath();
+    const { width } = canvas;
+    const scale = width / projection.width;
+    const path = new Path2D();
     let last = null;
     for (const [u, v] of border(view, ratio)) {
       const pixel = projection.pixel(view.ray(u, v));
-      const [x, y] = pixel ? pixel.map((p) => (p + 0.5) * scale) : [];
-      const joined = pixel && last !== null && Math.abs(x - last) < canvas.width / 2;
-      if (pixel) pen[joined ? 'lineTo' : 'moveTo'](x, y);
+      let [x, y] = pixel ? pixel.map((p) => (p + 0.5) * scale) : [];
+      if (projection.wraps && last !== null) x -= width * Math.round((x - last) / width);
+      const joined = pixel && last !== null && Math.abs(x - last) < width / 2;
+      if (pixel) path[joined ? 'lineTo' : 'moveTo'](x, y);
       last = pixel ? x : null;
+    }
+    // What goes on beyond one edge comes in at the other.
+    const outline = new Path2D();
+    for (const aside of projection.wraps ? [-width, 0, width] : [0]) {
+      outline.addPath(path, new DOMMatrix([1, 0, 0, 1, aside, 0]));
     }
     for (const [color, width] of [['rgb(0 0 0 / 60%)', 4], ['#fff', 1.6]]) {
       pen.strokeStyle = color;
       pen.lineWidth = width * devicePixelRatio;
-      pen.stroke();
+      pen.stroke(outline);
     }
   }
 }
