@@ -90,6 +90,8 @@ class PairInput:
         ]
 
 
+_TOLD_RAD, _WHERE_TOLD = radians(30.0), 0.5
+"""A rotation as near to what is expected needs so much less evidence of its own."""
 _AS_SURE = 0.43
 """So large a correlation, as a share of a probability, is as sure as that."""
 
@@ -114,8 +116,10 @@ def by_votes(pair: PairInput, settings: OverlapSettings) -> Overlap:
         message = 'both views are the same picture; is one camera used twice, or both covered?'
         return side_by_side(pair.left.surface, 'particles', message)
     expected, within_rad = _search(pair, settings)
+    is_told = pair.expected is not None and pair.within_rad < _TOLD_RAD
+    needed = settings.min_confidence * (_WHERE_TOLD if is_told else 1.0)
     result = measure_rotation(
-        views, expected=expected, within_rad=within_rad, min_confidence=settings.min_confidence
+        views, expected=expected, within_rad=within_rad, min_confidence=needed
     )
     attitude = Attitude.of(result.rotation.as_matrix()) if result.found else None
     if attitude and _is_wanted(attitude, pair, settings):
