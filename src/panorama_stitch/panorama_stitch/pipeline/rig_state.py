@@ -33,6 +33,8 @@ Images = Sequence[np.ndarray]
 
 _MOUNT_RAD, _YAW_MOUNT_RAD = radians(20.0), radians(60.0)
 """How far a rotation may be from what mounts say: all three angles of both, or their yaw only."""
+_MOST_SETS, _FEWEST_SETS = 6, 2
+"""Frame sets that one pair, and each of many pairs, is measured on."""
 _CLOSING_RAD = radians(10.0)
 """How far the closing rotation of a ring may be from what the others leave for it."""
 
@@ -132,6 +134,8 @@ class RigState(KnownCameras):
             for camera, image in zip(self.cameras, images, strict=True):
                 self.check(camera, image)
         measure = METHODS[method]
+        # Many pairs are measured on fewer frame sets each: whoever asked waits for all.
+        frame_sets = frame_sets[-max(_FEWEST_SETS, _MOST_SETS // (len(self.cameras) - 1 or 1)) :]
         overlaps = [
             measure(self._pair_input(pair, frame_sets), settings)
             for pair in pairs_of(len(self.cameras))
