@@ -33,6 +33,8 @@ _CLEAR, _CLEAR_SUPPORTED, _CLEAR_AREA = 0.55, 0.3, 40.0
 _CLEAR_SUPPORT = 2.5
 _SIGNIFICANT = 5.0
 """Enough that no larger patches need to be tried."""
+_SURELY_NEAR = 0.15
+"""Share of the votes below which what seems near is a few wrong ones."""
 _REDUNDANT = 4.0
 """Each place of the overlap is in so many patches."""
 _LENS_RAD = radians(0.02)
@@ -146,5 +148,7 @@ def _matches(pair, usable) -> Correspondences:
 
 
 def _near_deg(trial) -> float:
-    parallax = trial.fit.parallax_rad[trial.fit.near]
-    return float(np.degrees(np.percentile(parallax, 90))) if len(parallax) > 2 else 0.0
+    weight = trial.votes.weight
+    if weight[trial.fit.near].sum() < _SURELY_NEAR * weight.sum():
+        return 0.0
+    return float(np.degrees(np.percentile(trial.fit.parallax_rad[trial.fit.near], 90)))
