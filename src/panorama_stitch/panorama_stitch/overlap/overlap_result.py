@@ -1,11 +1,14 @@
 """What overlap calibration finds out about two neighbouring cameras."""
 
 from dataclasses import dataclass, replace
-from math import atan2, isnan, nan, tan
+from math import atan2, degrees, isnan, nan, radians, tan
 
 from fisheye_geometry.attitude import LEVEL, Attitude
 from fisheye_geometry.surface import Surface
 from panorama_stitch.overlap.particles import Particle
+
+_SHOWN_RAD = radians(0.1)
+"""Angles that differ by less are one for a person."""
 
 
 @dataclass(frozen=True)
@@ -138,8 +141,12 @@ def with_offset(
         surface.center_y_px + surface.focal_px * tan(attitude.pitch_rad)
         for surface, attitude in zip((left, right), attitudes, strict=True)
     ]
+    message = overlap.message
+    if abs(yaw_rad - overlap.attitude.yaw_rad) > _SHOWN_RAD:
+        message += f'; {degrees(yaw_rad):.2f} degrees about the level vertical'
     return replace(
         overlap,
+        message=message,
         offset_x_px=x_px,
         offset_y_px=horizons_px[0] - horizons_px[1],
         overlap_px=max(0.0, min(left.width - x_px, right.width)),
@@ -153,10 +160,7 @@ def overlap_by_hand(
     if isnan(x_px) and isnan(y_px):
         return measured
     x_px = measured.offset_x_px if isnan(x_px) else x_px
-    if isnan(y_px):
-        y_px = measured.offset_y_px
-    elif measured.attitude is None:
-        y_px = float(y_px)
+    y_px = measured.offset_y_px if isnan(y_px) else y_px
     found = measured.found or x_px != measured.offset_x_px
     tilt = measured.attitude or LEVEL
     attitude = attitude_at(x_px, y_px, left, right, tilt) if found else None
