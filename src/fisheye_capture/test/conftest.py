@@ -38,3 +38,13 @@ def write_picture(tmp_path):
         return path
 
     return write
+
+
+@pytest.fixture
+def video(tmp_path):
+    path = tmp_path / 'video.avi'
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*'MJPG'), 25, (32, 24))
+    for level in (50, 100, 150):
+        writer.write(np.full((24, 32, 3), level, np.uint8))
+    writer.release()
+    return path

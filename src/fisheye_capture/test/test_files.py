@@ -17,16 +17,6 @@ def levels(source, count):
     return [int(source.read().image[0, 0, 0]) for _ in range(count)]
 
 
-@pytest.fixture
-def video(tmp_path):
-    path = tmp_path / 'video.avi'
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*'MJPG'), 25, (32, 24))
-    for level in (50, 100, 150):
-        writer.write(np.full((24, 32, 3), level, np.uint8))
-    writer.release()
-    return path
-
-
 def test_a_picture_is_decoded_once_and_held(settings, write_picture):
     source = open_source(settings(write_picture('one.png', 7)))
     first, second = source.read(), source.read()

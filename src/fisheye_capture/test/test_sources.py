@@ -1,14 +1,14 @@
 """What a source's name means, and what is said of one that means nothing."""
 
 import os
+from contextlib import closing
 
 import numpy as np
 import pytest
 
-from fisheye_capture import sources
 from fisheye_capture.scene import Scene
 from fisheye_capture.source import SourceLostError, shown_source
-from fisheye_capture.sources import open_source
+from fisheye_capture.sources import SOURCES, kind_of, open_source
 from fisheye_core.errors import SourceError
 from fisheye_geometry.attitude import Attitude
 
@@ -39,15 +39,40 @@ def test_cameras_of_one_rate_share_a_grid_of_times(settings, write_picture):
 
 
 @pytest.mark.parametrize('name', ['0', '12', '/dev/video3', '/dev/v4l/by-id/usb-left'])
-def test_devices(settings, monkeypatch, name):
-    monkeypatch.setattr(sources, 'DeviceSource', lambda settings: settings.source)
-    assert open_source(settings(name)) == name
+def test_devices(name):
+    assert kind_of(name) == 'device'
 
 
 @pytest.mark.parametrize('scheme', ['http', 'https', 'rtsp', 'rtsps', 'udp', 'RTSP'])
-def test_streams(settings, monkeypatch, scheme):
-    monkeypatch.setattr(sources, 'StreamSource', lambda settings: settings.source)
-    assert open_source(settings(f'{scheme}://camera/stream')) == f'{scheme}://camera/stream'
+def test_streams(scheme):
+    assert kind_of(f'{scheme}://camera/stream') == 'stream'
+
+
+@pytest.fixture
+def names(tmp_path, write_picture, video):
+    return {
+        'synthetic': 'synthetic',
+        'device': '97',
+        'stream': 'http://127.0.0.1:1/stream',
+        'picture': str(write_picture('one.png', 7)),
+        'video': str(video),
+        'pictures': str(tmp_path / '*.png'),
+    }
+
+
+@pytest.mark.parametrize('kind', SOURCES)
+def test_a_name_means_one_kind(names, kind):
+    assert [each for each in SOURCES if SOURCES[each].recognises(names[kind])] == [kind]
+    assert kind_of(names[kind]) == kind
+
+
+@pytest.mark.parametrize('kind', SOURCES)
+def test_each_kind_gives_frames_or_says_that_it_may(settings, names, kind):
+    try:
+        with closing(open_source(settings(names[kind]))) as source:
+            assert source.read().size > (0, 0)
+    except SourceLostError:
+        assert kind in ('device', 'stream')  # neither camera is there
 
 
 def test_a_file_url_is_a_file(settings, write_picture):
