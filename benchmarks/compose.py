@@ -18,7 +18,8 @@ from timing import Spread, interleaved, spread
 from fisheye_geometry.attitude import LEVEL, Attitude
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.surface import Surface
-from panorama_stitch.compose.compositor import BLENDS, Compositor
+from panorama_stitch.compose.blends import BLENDS
+from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.compose.layout import Layout
 from panorama_stitch.compose.view import View
 from panorama_stitch.pipeline.panorama_settings import PanoramaSettings

@@ -23,7 +23,8 @@ from similarity import similarity_map
 from fisheye_capture.scene import Scene
 from fisheye_core.errors import FisheyeError
 from fisheye_geometry.attitude import Attitude
-from panorama_stitch.compose.compositor import BLENDS, Compositor
+from panorama_stitch.compose.blends import BLENDS
+from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.pipeline.panorama_settings import PanoramaSettings
 
 EXPOSURES = (1.0, 1.0), (1.0, 1.3)

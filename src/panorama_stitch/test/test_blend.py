@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from panorama_stitch.compose.blend import Feather, Multiband
-from panorama_stitch.compose.flow import Flow
+from panorama_stitch.compose.blends import BLENDS
 
 SHAPE = (90, 64, 3)
 EVERYWHERE = np.ones(SHAPE[:2], bool)
-BLENDS = [Feather, Multiband, Flow]
+KINDS = list(dict.fromkeys(blend.kind for blend in BLENDS.values()))
 HALO_LEVELS = 5
 """A multiband blend carries coarse detail, here of a step by 100 grey levels, that far."""
 
@@ -21,7 +21,7 @@ def flat(level, shape=SHAPE):
     return np.full(shape, level, np.uint8)
 
 
-@pytest.mark.parametrize('make', BLENDS)
+@pytest.mark.parametrize('make', KINDS)
 @pytest.mark.parametrize('channels', [np.s_[...], np.s_[..., 0]])
 def test_equal_views_stay_as_they_are(make, channels):
     left = np.ascontiguousarray(picture(1)[channels])
@@ -30,7 +30,7 @@ def test_equal_views_stay_as_they_are(make, channels):
     assert np.abs(right.astype(int) - picture(1)[channels]).max() <= 1
 
 
-@pytest.mark.parametrize('make', BLENDS)
+@pytest.mark.parametrize('make', KINDS)
 def test_it_fades_from_the_left_to_the_right(make):
     right = flat(160)
     make(EVERYWHERE, EVERYWHERE)(flat(60), right)
@@ -41,7 +41,7 @@ def test_it_fades_from_the_left_to_the_right(make):
     assert np.abs(levels[:, -1] - 160).max() <= 6
 
 
-@pytest.mark.parametrize('make', BLENDS)
+@pytest.mark.parametrize('make', KINDS)
 def test_what_one_shows_alone_is_taken_whole(make):
     left_seen, right_seen = EVERYWHERE.copy(), EVERYWHERE.copy()
     left_seen[:30], right_seen[60:] = False, False
@@ -67,7 +67,7 @@ def test_a_multiband_blend_shows_fine_detail_of_one_view_only():
     assert np.median(multiband) > 18
 
 
-@pytest.mark.parametrize('make', BLENDS)
+@pytest.mark.parametrize('make', KINDS)
 def test_a_strip_of_a_larger_picture_is_blended_in_place(make):
     panorama = flat(7, (90, 200, 3))
     make(EVERYWHERE, EVERYWHERE)(flat(60), panorama[:, 50:114])
@@ -76,7 +76,7 @@ def test_a_strip_of_a_larger_picture_is_blended_in_place(make):
     assert panorama[:, 50:114].any()
 
 
-@pytest.mark.parametrize('make', BLENDS)
+@pytest.mark.parametrize('make', KINDS)
 def test_narrow_strips_and_few_rows(make):
     for shape in ((90, 1), (1, 8), (3, 5)):
         seen = np.ones(shape, bool)

@@ -13,7 +13,8 @@ from fisheye_core.errors import ImageFormatError
 from fisheye_geometry.attitude import LEVEL, Attitude
 from fisheye_geometry.lens import make_lens
 from fisheye_geometry.surface import surface_for
-from panorama_stitch.compose.compositor import BLENDS, Compositor
+from panorama_stitch.compose.blends import BLENDS
+from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.compose.gain import GainCompensation
 from panorama_stitch.compose.layout import covered, lay_out
 from panorama_stitch.compose.placing import place
@@ -113,7 +114,7 @@ def test_every_blend_shows_the_scene_without_allocating_pictures(pictures, blend
     views = [View(LENS, SURFACE)] * 2
     darker = [pictures[0], (pictures[1] * 0.8).astype(np.uint8)]
     placed = placed_at(views, (OFFSET, 0))
-    layout = lay_out(placed, fade_px=10.0 * BLENDS[blend], crop='valid')
+    layout = lay_out(placed, fade_px=10.0 * BLENDS[blend].fade_scale, crop='valid')
     compositor = Compositor(layout, placed, blend, GainCompensation(layout, placed, darker))
     out = np.empty((layout.surface.height, layout.surface.width, 3), np.uint8)
     compositor.compose(darker, out)

@@ -14,7 +14,7 @@ from fisheye_capture.synthetic import synthetic_lens
 from fisheye_core.errors import FisheyeError
 from fisheye_core.settings import rules
 from fisheye_geometry.attitude import Attitude
-from panorama_stitch.compose.compositor import BLENDS
+from panorama_stitch.compose.blends import BLENDS
 from panorama_stitch.pipeline.panorama_settings import PanoramaOutputSettings, PanoramaSettings
 from panorama_stitch.pipeline.rig_state import RigState
 

@@ -16,8 +16,8 @@ from fisheye_geometry.remap import RemapTable
 from fisheye_geometry.rig import chain
 from fisheye_geometry.rig_solution import solve_rig
 from fisheye_geometry.surface import surface_for
+from panorama_stitch.compose.blends import BLENDS
 from panorama_stitch.compose.build import Style, build_compositor
-from panorama_stitch.compose.compositor import BLENDS
 from panorama_stitch.compose.layout import covered
 from panorama_stitch.compose.placing import leads_around, place
 from panorama_stitch.compose.posing import views_of_rig

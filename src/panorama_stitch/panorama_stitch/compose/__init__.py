@@ -4,6 +4,6 @@
 (one camera's pictures), `placing` (the surface around the rig, and where each camera shows
 anything), `layout` and `crop` (which columns are whose), `seam` (where neighbours agree best),
 `fade` and `blend` (how they meet there), `optical_flow` and `flow` (how near things meet, too),
-`gain` (how they become equally bright), `compositor` (all of it, frame after frame). `mask` tells
-where a camera sees the robot itself.
+`blends` (the table of these ways), `gain` (how they become equally bright), `compositor` (all of
+it, frame after frame). `mask` tells where a camera sees the robot itself.
 """

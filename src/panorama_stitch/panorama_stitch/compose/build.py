@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from panorama_stitch.compose.compositor import BLENDS, Compositor
+from panorama_stitch.compose.blends import BLENDS
+from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.compose.gain import GainCompensation
 from panorama_stitch.compose.layout import lay_out
 from panorama_stitch.compose.placing import place
@@ -58,7 +59,7 @@ def build_compositor(
         If there is no surface that holds the panorama.
     """
     placed = place(views, wraps=wraps)
-    fade_px = style.fade_rad * placed.surface.focal_px * BLENDS[style.blend]
+    fade_px = style.fade_rad * placed.surface.focal_px * BLENDS[style.blend].fade_scale
     layout = lay_out(placed, fade_px=fade_px, crop=style.crop)
     layout = optimise_seams(layout, placed, group)
     gain = None

@@ -9,22 +9,13 @@ import cv2
 import numpy as np
 
 from fisheye_core.parallel import run_parallel
-from panorama_stitch.compose.blend import BlendKind, Feather, Multiband
+from panorama_stitch.compose.blends import BLENDS
 from panorama_stitch.compose.fade import Fade
-from panorama_stitch.compose.flow import Flow
 from panorama_stitch.compose.gain import GainCompensation
 from panorama_stitch.compose.layout import Layout, neighbours, wrapped
 from panorama_stitch.compose.placing import Placed, PlacedView
 from panorama_stitch.compose.view import Cut
 
-_BLENDS: dict[str, BlendKind] = {
-    'none': Feather,
-    'feather': Feather,
-    'multiband': Multiband,
-    'flow': Flow,
-}
-BLENDS = {'none': 0.0, 'feather': 1.0, 'multiband': 4.0, 'flow': 1.0}
-"""The ways to blend, and the width of the fade of each in units of `feather_deg`."""
 _ALL_ROWS = slice(None)
 _MOST_SLABS = 4
 """Rows are shared between so many threads at most: more would wait for Python's lock."""
@@ -68,7 +59,7 @@ class Compositor:
         self.gain = gain
         self.views = tuple(p.view for p in sorted(placed.views, key=lambda view: view.index))
         self._fades = [
-            Fade(layout, seam, pair, _BLENDS[blend])
+            Fade(layout, seam, pair, BLENDS[blend].kind)
             for seam, pair in zip(layout.seams, neighbours(placed), strict=True)
         ]
         self.is_costly = any(fade.is_costly for fade in self._fades)

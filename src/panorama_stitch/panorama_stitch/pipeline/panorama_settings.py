@@ -10,7 +10,7 @@ from fisheye_core.settings import setting
 from fisheye_geometry.level import LEVELS, Mount
 from fisheye_geometry.rig import MAX_CAMERAS, RINGS
 from fisheye_undistort.undistort_settings import SurfaceSettings
-from panorama_stitch.compose.compositor import BLENDS
+from panorama_stitch.compose.blends import BLENDS
 from panorama_stitch.compose.layout import CROPS
 from panorama_stitch.overlap.overlap_settings import OverlapSettings
 
