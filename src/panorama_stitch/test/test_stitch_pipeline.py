@@ -152,7 +152,7 @@ def test_with_both_silent_nothing_is_published(make_line, pictures):
     line = make_line()
     line.feed(pictures, lambda: line.published, 'a panorama')
     deadline = time.monotonic() + DEADLINE_S
-    while len(line.pipeline.ages_s()) < 2:
+    while len(line.pipeline.frames.ages_s()) < 2:
         assert time.monotonic() < deadline
         line.news.wait(0.02)
     count = len(line.published)
@@ -331,7 +331,7 @@ def test_a_lens_that_changes_with_each_frame_stops_no_panorama(make_line, pictur
         lens = replace(LENS, focal_x_px=LENS.focal_x_px + 0.01 * index)
         line.pipeline.place('left', lens, SETTINGS.surface_of(lens))
         line.feed(pictures, lambda seen=count + index: len(line.published) >= seen, 'the next one')
-    assert line.pipeline.unpaired_s < SETTINGS.stale_after_s
+    assert line.pipeline.frames.unpaired_s < SETTINGS.stale_after_s
 
 
 def test_the_published_rule_asked_for_once_ruins_no_rig(make_line, pictures):

@@ -172,15 +172,15 @@ class PanoramaBase(Node):
             report.add(WARN, sentence)
         if sentence := economy_sentence(pipeline):
             report.add(WARN, sentence)
-        if pipeline.unpaired_s > self.settings.stale_after_s:
+        if pipeline.frames.unpaired_s > self.settings.stale_after_s:
             report.add(ERROR, unpaired_sentence(pipeline))
-        ages_s = pipeline.ages_s()
+        ages_s = pipeline.frames.ages_s()
         all_stale = len(ages_s) == len(self.settings.cameras)
         for camera, age_s in ages_s.items():
             report.add(ERROR if all_stale else WARN, f'{camera}: no picture for {age_s:.0f} s')
         if not ages_s:
             # Frames without a partner are not shed: what they lack is another camera's.
-            self._overload.tell(report, self._handled, pipeline.overtaken)
+            self._overload.tell(report, self._handled, pipeline.frames.overtaken)
         report.values['rate Hz'] = self._rate.hz
         report.values['panoramas published'] = self._published
         report.values.update(metrics(pipeline))

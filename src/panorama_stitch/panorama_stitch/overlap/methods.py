@@ -21,6 +21,7 @@ from panorama_stitch.overlap.measure import measure_rotation
 from panorama_stitch.overlap.overlap_result import Overlap, side_by_side
 from panorama_stitch.overlap.overlap_settings import OverlapSettings
 from panorama_stitch.overlap.reported_particles import with_particles
+from panorama_stitch.overlap.result import LIMITS, RotationResult
 from panorama_stitch.overlap.view import OverlapView
 
 _UNKNOWN_TILT_RAD = radians(50.0)
@@ -127,13 +128,19 @@ def by_votes(pair: PairInput, settings: OverlapSettings) -> Overlap:
         overlap = Overlap('particles', True, attitude=attitude, near_deg=result.near_deg)
         overlap = replace(overlap, message=f'{wording.direction(attitude)}, {result.message}')
     else:
-        overlap = side_by_side(
-            pair.left.surface, 'particles', f'no common scene: {result.message}'
-        )
+        overlap = side_by_side(pair.left.surface, 'particles', _not_found(result, needed))
     overlap = replace(overlap, confidence=result.confidence)
     images = pair.images[-1]
     corrected = pair.left.corrected(images[0]), pair.right.corrected(images[1])
     return with_particles(overlap, corrected, pair.surfaces)
+
+
+def _not_found(result: RotationResult, needed: float) -> str:
+    """Return the sentence that no overlap is believed, and why."""
+    if result.rotation is None:
+        return 'no common scene: nothing in both views is alike'
+    why = f': {LIMITS[result.limit]}' if result.limit else ''
+    return f'no common scene: confidence {result.confidence:.2f}, {needed:.2f} is needed{why}'
 
 
 def _search(pair: PairInput, settings: OverlapSettings) -> tuple[Rotation | None, float]:

@@ -12,10 +12,10 @@ import numpy as np
 
 from fisheye_core.background import Background
 from fisheye_core.errors import FisheyeError, OverlapError
-from fisheye_geometry.surface import Surface
 from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.overlap.overlap_file import read_overlaps, write_overlaps
-from panorama_stitch.overlap.overlap_result import Overlap, side_by_side
+from panorama_stitch.overlap.overlap_result import Overlap
+from panorama_stitch.pipeline.overlap_choice import believed, kept
 from panorama_stitch.pipeline.panorama_settings import PanoramaOutputSettings
 from panorama_stitch.pipeline.rig_state import RigState
 from panorama_stitch.pipeline.seam_watch import SeamWatch
@@ -183,10 +183,10 @@ class CompositorBuilder:
         measured = self._measured(remembered, settings, method or settings.method)
         if settings.method != 'paper':
             measured = [
-                _believed(new, surfaces[index % len(surfaces)], settings.min_confidence)
+                believed(new, surfaces[index % len(surfaces)], settings.min_confidence)
                 for index, new in enumerate(measured)
             ]
-        overlaps = _kept(measured, rig.overlaps or [])
+        overlaps = kept(measured, rig.overlaps or [])
         if save and all(overlap.found for overlap in measured):
             write_overlaps(settings.overlap_file, rig.cameras, surfaces, overlaps)
         if not rig.set_overlaps(overlaps, surfaces):
@@ -217,36 +217,3 @@ class CompositorBuilder:
                 rig.set_overlaps(overlaps, surfaces)
         except FisheyeError as error:
             self.tell(f'{error}; the overlap is measured instead')
-
-
-def _kept(measured: list[Overlap], former: list[Overlap]) -> list[Overlap]:
-    """Return what was measured, but what was found before where nothing was found now."""
-    if len(former) != len(measured):
-        # A ring was closed or opened; it is whole only with what was measured together.
-        return measured if all(new.found for new in measured) or not former else former
-    return [
-        new if new.found or not old.found else old
-        for new, old in zip(measured, former, strict=True)
-    ]
-
-
-def _believed(result: Overlap, left: Surface, needed: float) -> Overlap:
-    """Return a result as it is, or as not found where its confidence is less than is needed.
-
-    The published rule always names an offset: asked for once, it must not ruin a rig that runs.
-    """
-    if result.method != 'paper' or not result.found or result.confidence >= needed:
-        return result
-    message = (
-        f'{result.message}; not used: its confidence is {result.confidence:.2f}, '
-        f'{needed:.2f} is needed (with the parameter method:=paper it is used all the same)'
-    )
-    aside = side_by_side(left, result.method, message)
-    return replace(
-        result,
-        found=False,
-        offset_x_px=aside.offset_x_px,
-        offset_y_px=aside.offset_y_px,
-        overlap_px=aside.overlap_px,
-        message=message,
-    )

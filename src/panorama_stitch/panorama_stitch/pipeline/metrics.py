@@ -15,15 +15,15 @@ def metrics(pipeline: StitchPipeline) -> dict[str, float | str]:
     """Return rates, losses, skew and the overlaps in use, each with its name and unit."""
     cameras = pipeline.rig.cameras
     values: dict[str, float | str] = {
-        'pairs overtaken': pipeline.overtaken,
+        'pairs overtaken': pipeline.frames.overtaken,
         'pairs broken': pipeline.broken,
     }
     if pipeline.compositor and pipeline.compositor.is_costly:
         values['economy'] = 'on' if pipeline.economy.is_on else 'off'
     for camera in cameras:
-        values[f'{camera} rate Hz'] = pipeline.rates[camera].hz
-        values[f'{camera} unpaired'] = pipeline.pairing.unpaired[camera]
-    skews_ms = np.array(list(pipeline.pairing.skews_ns)) / 1e6
+        values[f'{camera} rate Hz'] = pipeline.frames.rates[camera].hz
+        values[f'{camera} unpaired'] = pipeline.frames.pairing.unpaired[camera]
+    skews_ms = np.array(list(pipeline.frames.pairing.skews_ns)) / 1e6
     if len(skews_ms):
         values['skew median ms'] = float(np.median(skews_ms))
         values['skew worst ms'] = float(skews_ms.max())
@@ -72,8 +72,10 @@ def economy_sentence(pipeline: StitchPipeline) -> str:
 def unpaired_sentence(pipeline: StitchPipeline) -> str:
     """Return the sentence that no frames belong together, with what is known of the cause."""
     settings = pipeline.settings
-    sentence = f'pictures come, but for {pipeline.unpaired_s:.0f} s none that belong together'
-    spread_s = pipeline.pairing.spread_ns / 1e9
+    sentence = (
+        f'pictures come, but for {pipeline.frames.unpaired_s:.0f} s none that belong together'
+    )
+    spread_s = pipeline.frames.pairing.spread_ns / 1e9
     if spread_s <= settings.max_pair_skew_s:
         return sentence
     limit = f'(max_pair_skew_s is {settings.max_pair_skew_s:g})'
