@@ -1,21 +1,26 @@
 """The nodes end to end: rates, delays and cost, as a subscriber in another process sees them."""
 
+import json
 import os
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from math import radians
 from pathlib import Path
 
 import cv2
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
-from pairs import SIDES, synthetic_pair
+from known_rigs import KnownRig, folder_rig, synthetic_rig
 from targets import Requirement
 
+from fisheye_capture.capture_settings import CaptureSettings
+from fisheye_capture.scene import Scene
+from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.camera_file import Camera, write_camera
 from fisheye_testing.health import usage
-from fisheye_testing.rig import RigProcesses, camera_parameters, unused_domain
+from fisheye_testing.rig import RigProcesses, unused_domain
 from fisheye_testing.waiting import wait_for
 from fisheye_testing.watcher import Watcher
 
@@ -34,6 +39,8 @@ class Setup:
     size: tuple[int, int]
     frame_rate_hz: float = FULL_SPEED_HZ
     composed: bool = True
+    rig: str = 'pair'
+    """One of `known_rigs.SYNTHETIC_RIGS`, whose pictures are taken once and held in memory."""
     prefix: tuple[str, ...] = ()
     blend: str = 'feather'
     most: dict[str, float] = field(default_factory=dict)
@@ -54,6 +61,8 @@ SETUPS = (
     Setup('one node 1280x960, full speed', LARGE, least={'rate_hz': 40}),
     Setup('one node 1280x960, 30 Hz', LARGE, 30.0),
     Setup('the same with flow, 1280x960', LARGE, 30.0, blend='flow'),
+    Setup('four cameras, full speed', SMALL, rig='ring4', least={'rate_hz': 40}),
+    Setup('four cameras, 30 Hz', SMALL, 30.0, rig='ring4', most={'memory_mib': 384}),
     Setup('five nodes 640x480, 30 Hz', SMALL, 30.0, False, most={'p99_ms': 50, 'missing': 0}),
     Setup('five nodes 1280x960, 30 Hz', LARGE, 30.0, False),
 )
@@ -86,6 +95,8 @@ class Run:
         Processor time of all nodes for one panorama.
     memory_mib
         Resident memory of the largest node.
+    calibration_s
+        For an answer of calibrate_overlap; of a ring: from the first panorama until it is closed.
     """
 
     name: str
@@ -159,7 +170,7 @@ def run_rig(setup: Setup, seconds: float, log_folder: Path) -> Run:
         Watcher(domain) as watcher,
         RigProcesses(domain, log_folder) as rig,
     ):
-        cameras = camera_parameters(save_pair(Path(folder), setup.size))
+        cameras = save_rig(Path(folder), synthetic_rig(setup.rig), setup.size).cameras
         counts = Counts(watcher)
         begin = time.monotonic()
         values = {'frame_rate_hz': setup.frame_rate_hz}
@@ -169,7 +180,10 @@ def run_rig(setup: Setup, seconds: float, log_folder: Path) -> Run:
         wait_for(lambda: rig.check_alive() or watcher.newest, START_TIMEOUT_S, 'a first panorama')
         first_s = time.monotonic() - begin
         begin = time.monotonic()
-        watcher.calibrate()
+        wait_for(lambda: is_whole(watcher, setup), START_TIMEOUT_S, 'a measured rig')
+        if len(cameras) == 2:  # a ring may take longer than the service waits, and goes on then
+            begin = time.monotonic()
+            watcher.calibrate()
         calibration_s = time.monotonic() - begin
         time.sleep(SETTLE_S)
         watcher.restart()
@@ -194,13 +208,26 @@ def run_rig(setup: Setup, seconds: float, log_folder: Path) -> Run:
         )
 
 
-def save_pair(folder: Path, size: tuple[int, int]) -> Path:
-    """Write pictures and calibration of the synthetic rig."""
-    pair = synthetic_pair(*size)
-    for side, lens, image in zip(SIDES, pair.lenses, pair.images, strict=True):
-        cv2.imwrite(str(folder / f'{side}.png'), image)
-        write_camera(folder / f'{side}.yaml', Camera(side, lens))
-    return folder
+def is_whole(watcher: Watcher, setup: Setup) -> bool:
+    """Whether all overlaps were found, and the panorama of a ring is closed."""
+    overlaps, projection = watcher.overlaps, watcher.projection
+    is_closed = synthetic_rig(setup.rig).is_closed
+    return (
+        projection is not None
+        and projection.wraps == is_closed
+        and overlaps is not None
+        and all(overlap.found for overlap in overlaps.overlaps)
+    )
+
+
+def save_rig(folder: Path, rig: KnownRig, size: tuple[int, int]) -> KnownRig:
+    """Write images and calibrations of a synthetic rig, and return the rig that reads them."""
+    lens, scene = synthetic_lens(*size, radians(CaptureSettings().synthetic_fov_deg)), Scene()
+    for name, attitude in zip(rig.cameras, rig.attitudes, strict=True):
+        cv2.imwrite(str(folder / f'{name}.png'), scene.view(lens, attitude).frame(0))
+        write_camera(folder / f'{name}.yaml', Camera(name, lens))
+    (folder / 'truth.json').write_text(json.dumps({'cameras': list(rig.cameras)}))
+    return folder_rig(folder)
 
 
 def cpu_s(rig: RigProcesses) -> float:

@@ -26,7 +26,7 @@ class Gravity:
         self._used_s = -_PAUSE_S
 
     def feel(self, gravity: np.ndarray) -> bool:
-        """Take what was felt, (3,); return whether `direction` is another one now."""
+        """Add what was felt, (3,); return whether `direction` is another one now."""
         former = gravity if self._smooth is None else self._smooth
         smooth = (1 - _SHARE) * former + _SHARE * gravity
         self._smooth = smooth / max(float(np.linalg.norm(smooth)), 1e-9)
