@@ -25,10 +25,11 @@ from fisheye_core.errors import FisheyeError
 from fisheye_geometry.attitude import angle_between
 from fisheye_geometry.camera_file import read_camera
 from fisheye_geometry.image_circle import ImageCircle
+from fisheye_geometry.lens_surface import surface_for
 from fisheye_geometry.level import DOWN
 from fisheye_geometry.rig import Rig, pairs_of
 from fisheye_geometry.rig_solution import solve_rig
-from fisheye_geometry.surface import SURFACES, surface_for
+from fisheye_geometry.surface import SURFACES
 from panorama_stitch.compose.build import Style, build_compositor
 from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.compose.layout import covered

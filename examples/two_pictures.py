@@ -13,8 +13,8 @@ import numpy as np
 
 from fisheye_core.picture_file import read_picture
 from fisheye_geometry.camera_file import read_camera
+from fisheye_geometry.lens_surface import surface_for
 from fisheye_geometry.rig_solution import solve_rig
-from fisheye_geometry.surface import surface_for
 from panorama_stitch.compose.build import Style, build_compositor
 from panorama_stitch.compose.posing import views_of_rig
 from panorama_stitch.overlap.measure import measure_rotation

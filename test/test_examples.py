@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from fisheye_geometry.camera_file import read_camera
+from fisheye_geometry.lens_surface import surface_for
 from fisheye_geometry.remap import remap_table
-from fisheye_geometry.surface import surface_for
 from fisheye_testing.rig import SIDES
 from fisheye_testing.waiting import wait_for
 from fisheye_testing.watcher import Watcher

@@ -13,8 +13,9 @@ from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.lens import FisheyeLens
+from fisheye_geometry.lens_surface import surface_for
 from fisheye_geometry.remap import remap_table
-from fisheye_geometry.surface import SURFACES, surface_for
+from fisheye_geometry.surface import SURFACES
 
 LEFT = Attitude(yaw_rad=np.radians(-70))
 AT_SEAM_NS = 200_000_000

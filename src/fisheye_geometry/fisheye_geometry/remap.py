@@ -1,15 +1,14 @@
 """Remap tables: where each pixel of a corrected picture comes from, computed once."""
 
-from collections.abc import Iterator
 from copy import copy
 from functools import cached_property, lru_cache
-from typing import NamedTuple
 
 import cv2
 import numpy as np
 
 from fisheye_core.errors import GeometryError, ImageFormatError
 from fisheye_geometry.attitude import LEVEL, Attitude
+from fisheye_geometry.band import Band, band_rows, bands_of
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.surface import Surface
 
@@ -22,25 +21,6 @@ INTERPOLATIONS = tuple(_INTERPOLATIONS)
 
 _OUTSIDE_PX = -100
 """Far enough from the picture that no interpolation reaches it."""
-_BAND_PX = 20_000
-"""Rows are drawn in bands of about so many pixels of the picture, which stay in the cache."""
-_STRIDE = 4
-"""Columns from one that tells what a band needs to the next."""
-
-
-class _Band(NamedTuple):
-    """Some rows of a surface.
-
-    Attributes
-    ----------
-    rows
-        Of the surface.
-    fresh
-        Rows and columns of the picture that are needed here, rows of the band above left out.
-    """
-
-    rows: slice
-    fresh: tuple[slice, slice]
 
 
 class RemapTable:
@@ -95,7 +75,7 @@ class RemapTable:
         self._fractions: np.ndarray | None = None
         if interpolation != 'nearest':
             self._fractions = np.empty(shape, np.uint16)
-        for rows in self._band_rows():
+        for rows in band_rows(surface.height, self._input_shape[1]):
             where, self.valid[rows] = _source_pixels(source, surface, attitude, rows)
             pixels, fractions = cv2.convertMaps(
                 where, None, cv2.CV_16SC2, nninterpolation=self._fractions is None
@@ -118,20 +98,9 @@ class RemapTable:
         part.valid.setflags(write=False)
         return part
 
-    def _band_rows(self) -> Iterator[slice]:
-        step = max(8, round(_BAND_PX / self._input_shape[1]))
-        for top in range(0, self.surface.height, step):
-            yield slice(top, min(top + step, self.surface.height))
-
     @cached_property
-    def _bands(self) -> list[_Band]:
-        bands, above = [], (range(0), range(0))
-        for rows in self._band_rows():
-            part = rows, slice(None, None, _STRIDE)
-            needed = _needed(self._pixels[part][self.valid[part]])
-            bands.append(_Band(rows, _fresh(needed, above)))
-            above = needed
-        return bands
+    def _bands(self) -> list[Band]:
+        return bands_of(self._pixels, self.valid, self._input_shape[1])
 
     def __call__(self, image: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
         """Correct a picture.
@@ -216,22 +185,3 @@ def _source_pixels(
     seen &= np.all((pixels >= -0.5) & (pixels <= last + 0.5), axis=-1)
     where = np.where(seen[..., None], np.clip(pixels, 0, last), _OUTSIDE_PX)
     return where.astype(np.float32), seen
-
-
-def _needed(pixels: np.ndarray) -> tuple[range, range]:
-    """Rows and columns of the picture in which pixels (n, 2) lie."""
-    if not len(pixels):
-        return range(0), range(0)
-    (left, top), (right, bottom) = pixels.min(axis=0).tolist(), pixels.max(axis=0).tolist()
-    return range(top, bottom + 2), range(left, right + 2)
-
-
-def _fresh(needed: tuple[range, range], above: tuple[range, range]) -> tuple[slice, slice]:
-    """Leave out the rows that were needed above."""
-    (rows, columns), (rows_above, _) = needed, above
-    begin, end = rows.start, rows.stop
-    if end > rows_above.stop:
-        begin = max(begin, rows_above.stop)
-    else:
-        end = min(end, rows_above.start)
-    return slice(begin, end), slice(columns.start, columns.stop)

@@ -6,7 +6,7 @@ import pytest
 from fisheye_core.errors import CalibrationError
 from fisheye_geometry.image_circle import LensWithImageCircle
 from fisheye_geometry.lens import AnnularLens, make_lens
-from fisheye_geometry.surface import surface_for
+from fisheye_geometry.lens_surface import surface_for
 
 EXACT = 1e-9
 INNER, FIRST, LAST = 0.25, np.radians(-50), np.radians(20)

@@ -6,8 +6,9 @@ import pytest
 from fisheye_core.errors import GeometryError, ImageFormatError
 from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.lens import make_lens
+from fisheye_geometry.lens_surface import surface_for
 from fisheye_geometry.remap import INTERPOLATIONS, RemapTable, remap_table
-from fisheye_geometry.surface import Surface, surface_for
+from fisheye_geometry.surface import Surface
 
 LENS = make_lens(
     'equidistant', 320, 240, [111.5, 0, 159.5, 0, 111.5, 119.5, 0, 0, 1], [-0.02, 0.004, 0, 0]

@@ -5,7 +5,8 @@ import pytest
 
 from fisheye_core.errors import GeometryError
 from fisheye_geometry.lens import make_lens
-from fisheye_geometry.surface import SURFACES, Surface, surface_for
+from fisheye_geometry.lens_surface import surface_for
+from fisheye_geometry.surface import SURFACES, Surface
 from fisheye_geometry.surface_kind import KINDS, SurfaceKind
 
 LENS = make_lens(

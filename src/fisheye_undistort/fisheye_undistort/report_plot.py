@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from fisheye_core.errors import FileAccessError
+from fisheye_geometry.lens_surface import surface_for
 from fisheye_geometry.remap import RemapTable
-from fisheye_geometry.surface import surface_for
 from fisheye_undistort.calibration import Calibration
 from fisheye_undistort.figure_file import check_suffix, write_figure
 from fisheye_undistort.report import CalibrationReport

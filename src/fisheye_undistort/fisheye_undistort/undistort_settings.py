@@ -6,8 +6,9 @@ from math import isnan, nan, radians
 from fisheye_core.settings import setting
 from fisheye_geometry.attitude import LEVEL, Attitude
 from fisheye_geometry.lens import Lens
+from fisheye_geometry.lens_surface import SCALES, surface_for
 from fisheye_geometry.remap import INTERPOLATIONS
-from fisheye_geometry.surface import SCALES, SURFACES, Surface, surface_for
+from fisheye_geometry.surface import SURFACES, Surface
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from conftest import fisheye, seen_exactly
 from rendered_view import facing_pose, render_view, scattered_poses
 
 from fisheye_core.errors import CalibrationError
-from fisheye_geometry.surface import surface_for
+from fisheye_geometry.lens_surface import surface_for
 from fisheye_undistort.calibration import calibrate
 from fisheye_undistort.circle_bias import center_bias
 from fisheye_undistort.detection import Detector

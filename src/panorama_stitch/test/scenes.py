@@ -9,8 +9,9 @@ from fisheye_geometry.attitude import LEVEL, Attitude
 from fisheye_geometry.camera_file import read_camera
 from fisheye_geometry.image_circle import ImageCircle
 from fisheye_geometry.lens import FisheyeLens
+from fisheye_geometry.lens_surface import surface_for
 from fisheye_geometry.remap import RemapTable
-from fisheye_geometry.surface import Surface, surface_for
+from fisheye_geometry.surface import Surface
 from fisheye_testing.data import data_folder
 from panorama_stitch.compose.placing import place
 from panorama_stitch.compose.posing import views_at_overlaps

@@ -12,7 +12,7 @@ from fisheye_capture.scene import Scene
 from fisheye_core.errors import ImageFormatError
 from fisheye_geometry.attitude import LEVEL, Attitude
 from fisheye_geometry.lens import make_lens
-from fisheye_geometry.surface import surface_for
+from fisheye_geometry.lens_surface import surface_for
 from panorama_stitch.compose.blends import BLENDS
 from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.compose.gain import GainCompensation

@@ -7,7 +7,7 @@ from scenes import placed_at
 from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.attitude import Attitude
-from fisheye_geometry.surface import surface_for
+from fisheye_geometry.lens_surface import surface_for
 from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.compose.gain import GainCompensation
 from panorama_stitch.compose.layout import lay_out

@@ -21,7 +21,8 @@ from scenes import (
 
 from fisheye_core.errors import OverlapError
 from fisheye_geometry.attitude import LEVEL, Attitude
-from fisheye_geometry.surface import SURFACES, Surface, surface_for
+from fisheye_geometry.lens_surface import surface_for
+from fisheye_geometry.surface import SURFACES, Surface
 from fisheye_testing.data import data_folder
 from panorama_stitch.overlap.corrected_overlap import measure_corrected
 from panorama_stitch.overlap.methods import METHODS, CameraView, PairInput

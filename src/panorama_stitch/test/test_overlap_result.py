@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fisheye_capture.synthetic import synthetic_lens
-from fisheye_geometry.surface import surface_for
+from fisheye_geometry.lens_surface import surface_for
 from panorama_stitch.overlap.overlap_result import yaw_between_rad
 
 SURFACE = surface_for(synthetic_lens(640, 480, np.radians(170)))

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scenes import lens
 
+from fisheye_geometry.lens_surface import surface_for
 from fisheye_geometry.remap import RemapTable
-from fisheye_geometry.surface import surface_for
 from panorama_stitch.overlap.pose import Pose
 
 

@@ -11,11 +11,11 @@ from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.lens import AnnularLens, make_lens
+from fisheye_geometry.lens_surface import surface_for
 from fisheye_geometry.level import levelled
 from fisheye_geometry.remap import RemapTable
 from fisheye_geometry.rig import chain
 from fisheye_geometry.rig_solution import solve_rig
-from fisheye_geometry.surface import surface_for
 from panorama_stitch.compose.blends import BLENDS
 from panorama_stitch.compose.build import Style, build_compositor
 from panorama_stitch.compose.layout import covered

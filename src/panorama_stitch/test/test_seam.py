@@ -5,7 +5,7 @@ import pytest
 from scenes import placed_at
 
 from fisheye_geometry.lens import make_lens
-from fisheye_geometry.surface import surface_for
+from fisheye_geometry.lens_surface import surface_for
 from panorama_stitch.compose.layout import lay_out
 from panorama_stitch.compose.seam import optimise_seams
 from panorama_stitch.compose.view import View

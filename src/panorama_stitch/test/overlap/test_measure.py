@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from seeing import LENS, apart_deg, see, turned, world
 
+from fisheye_geometry.lens_surface import surface_for
 from fisheye_geometry.remap import RemapTable
-from fisheye_geometry.surface import surface_for
 from panorama_stitch.overlap.measure import measure_rotation
 from panorama_stitch.overlap.view import OverlapView
 
