@@ -1,9 +1,10 @@
 """Pictures to panorama.
 
 `build` is the recipe, `posing` gives it the views of a rig. In the order in which to read: `view`
-(one camera's pictures), `placing` (the surface around the rig, and where each camera shows
-anything), `layout` and `crop` (which columns are whose), `seam` (where neighbours agree best),
-`fade` and `blend` (how they meet there), `optical_flow` and `flow` (how near things meet, too),
-`blends` (the table of these ways), `gain` (how they become equally bright), `compositor` (all of
-it, frame after frame). `mask` tells where a camera sees the robot itself.
+(one camera's pictures), `placing` (the surface around the rig) and `placed` (where each camera
+shows anything on it), `layout` and `crop` (which columns are whose), `seam` (where neighbours
+agree best), `fade` and `blend` (how they meet there), `optical_flow` and `flow` (how near things
+meet, too), `blends` (the table of these ways), `brightness` and `gain` (how they become equally
+bright), `compositor` (all of it, frame after frame). `mask` tells where a camera sees the robot
+itself.
 """

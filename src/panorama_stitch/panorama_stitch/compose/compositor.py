@@ -13,7 +13,7 @@ from panorama_stitch.compose.blends import BLENDS
 from panorama_stitch.compose.fade import Fade
 from panorama_stitch.compose.gain import GainCompensation
 from panorama_stitch.compose.layout import Layout, neighbours, wrapped
-from panorama_stitch.compose.placing import Placed, PlacedView
+from panorama_stitch.compose.placed import Placed, PlacedView
 from panorama_stitch.compose.view import Cut
 
 _ALL_ROWS = slice(None)

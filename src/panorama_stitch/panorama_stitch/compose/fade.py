@@ -4,7 +4,7 @@ import numpy as np
 
 from panorama_stitch.compose.blend import Blend, BlendKind
 from panorama_stitch.compose.layout import Layout, Seam, shared, wrapped
-from panorama_stitch.compose.placing import PlacedView
+from panorama_stitch.compose.placed import PlacedView
 
 _MOST_OVERLAP_RAD = np.radians(40.0)
 """Columns beside a seam that a blend may ask for: more cost time and gain little."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from fisheye_geometry.surface import Surface
 from panorama_stitch.compose.crop import CROPS, valid_rectangle
-from panorama_stitch.compose.placing import Placed, PlacedView
+from panorama_stitch.compose.placed import Placed, PlacedView
 
 __all__ = ['CROPS', 'Layout', 'Seam', 'covered', 'lay_out']
 

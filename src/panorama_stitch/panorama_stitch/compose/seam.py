@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 from panorama_stitch.compose.layout import Layout, Seam, between, neighbours
-from panorama_stitch.compose.placing import Placed, PlacedView
+from panorama_stitch.compose.placed import Placed, PlacedView
 
 _LARGEST_DIFFERENCE = 40.0
 """Grey levels; what differs more is no worse."""
