@@ -106,7 +106,7 @@ class FrameSets:
             self.pairing.max_skew_ns = round(settings.max_pair_skew_s * 1e9)
 
     def close(self) -> None:
-        """Have `get`, now and later, return None."""
+        """Make `get`, now and later, return None."""
         self._waiting.close()
 
     def shown(self, frames: FrameSet) -> list[np.ndarray]:
