@@ -11,18 +11,14 @@ from math import isnan, nan, radians
 import cv2
 import numpy as np
 
-from fisheye_core.errors import OverlapError
 from fisheye_geometry.attitude import LEVEL
 from fisheye_geometry.surface import Surface
 from panorama_stitch.overlap import paper, wording
+from panorama_stitch.overlap.corrected_pairs import check_pairs
 from panorama_stitch.overlap.overlap_result import Overlap, attitude_at, side_by_side
 from panorama_stitch.overlap.overlap_settings import OverlapSettings
-from panorama_stitch.overlap.registration import Registration, Search, fit_at, register
-
-_SMALLEST_PX = 32
-"""Sides of a picture that can hold an overlap."""
-_FOCAL_TOLERANCE = 1e-3
-"""Relative difference of the focal lengths that moves a whole picture by less than a pixel."""
+from panorama_stitch.overlap.registration import Registration, fit_at, register
+from panorama_stitch.overlap.search import Search
 
 
 def measure_corrected(
@@ -52,7 +48,7 @@ def measure_corrected(
     OverlapError
         If a picture is missing or fits its surface not, or the surfaces do not fit together.
     """
-    _check(pairs, surface_left, surface_right)
+    check_pairs(pairs, surface_left, surface_right)
     overlaps = [
         _Measurement(left, right, surface_left, surface_right, settings).run(method)
         for left, right in pairs
@@ -61,40 +57,6 @@ def measure_corrected(
     if 2 * len(found) <= len(overlaps):
         return max((o for o in overlaps if not o.found), key=lambda o: o.confidence)
     return found[len(found) // 2]
-
-
-def _check(pairs, surface_left, surface_right) -> None:
-    if not pairs:
-        raise OverlapError('no pair of pictures was given; expected at least one')
-    if surface_left.kind != surface_right.kind:
-        raise OverlapError(
-            f'the left picture is {surface_left.kind}, the right one {surface_right.kind}; '
-            'expected one kind of surface'
-        )
-    if abs(surface_left.focal_px / surface_right.focal_px - 1) > _FOCAL_TOLERANCE:
-        raise OverlapError(
-            f'the pictures have focal lengths of {surface_left.focal_px:g} and '
-            f'{surface_right.focal_px:g} px; expected one for both'
-        )
-    for surface in (surface_left, surface_right):
-        if min(surface.width, surface.height) < _SMALLEST_PX:
-            raise OverlapError(
-                f'a picture of {surface.width}x{surface.height} px is too small; expected at '
-                f'least {_SMALLEST_PX} px to each side'
-            )
-    for left, right in pairs:
-        _check_picture('left', left, surface_left)
-        _check_picture('right', right, surface_right)
-
-
-def _check_picture(side, picture, surface) -> None:
-    if picture is None:
-        raise OverlapError(f'the {side} picture is missing')
-    if picture.dtype != np.uint8 or picture.shape[:2] != (surface.height, surface.width):
-        raise OverlapError(
-            f'the {side} picture is {picture.dtype}{picture.shape}; expected uint8 of '
-            f'{surface.width}x{surface.height} px'
-        )
 
 
 class _Measurement:

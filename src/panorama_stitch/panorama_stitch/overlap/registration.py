@@ -2,7 +2,7 @@
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
-from math import inf, radians
+from math import radians
 from operator import itemgetter
 
 import numpy as np
@@ -12,6 +12,7 @@ from panorama_stitch.overlap.alignment import align, overlap_score, refine
 from panorama_stitch.overlap.correlation import ScoreMap, correlate
 from panorama_stitch.overlap.particles import facing_halves
 from panorama_stitch.overlap.pose import Pose
+from panorama_stitch.overlap.search import Search
 from panorama_stitch.overlap.structure import FacingPair, face
 
 _SEARCH_PX_PER_DEG, _FINE_PX_PER_DEG = 2.0, 4.0
@@ -28,31 +29,6 @@ _AS_GOOD = 0.002
 _DISTINCT_RATIO, _DISTINCT_MARGIN = 1.4, 0.1
 """Where the scene is distinct, any other offset leaves this many times more unexplained, and its
 fit is this much lower; less can come from noise, or from the edges of the pictures."""
-
-
-@dataclass(frozen=True)
-class Search:
-    """What is known before anything is seen.
-
-    Attributes
-    ----------
-    x_px
-        Smallest and largest offset of the right half in the left one.
-    max_rise_deg
-        How far the right view may lie above or below the left one.
-    min_overlap_deg
-        Narrowest overlap to look for.
-    tilt
-        Whether the right camera may be turned.
-    min_confidence
-        Confidence at which an offset is taken for found.
-    """
-
-    x_px: tuple[float, float] = (-inf, inf)
-    max_rise_deg: float = 4.0
-    min_overlap_deg: float = 5.0
-    tilt: bool = True
-    min_confidence: float = 0.3
 
 
 @dataclass(frozen=True)
