@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fisheye_undistort.lens_fit import Estimate, TargetView
+from fisheye_undistort.estimate import Estimate, TargetView
 from fisheye_undistort.sheet_model import project, to_camera, warp_board
 from fisheye_undistort.target import Target
 

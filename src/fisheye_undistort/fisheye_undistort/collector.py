@@ -4,7 +4,7 @@ import numpy as np
 
 from fisheye_core.errors import CalibrationError, ImageFormatError
 from fisheye_undistort.detection import Detector
-from fisheye_undistort.lens_fit import TargetView
+from fisheye_undistort.estimate import TargetView
 from fisheye_undistort.pictures import NamedPicture
 
 _MOVED = 0.01

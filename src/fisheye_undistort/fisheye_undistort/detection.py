@@ -7,8 +7,8 @@ import numpy as np
 
 from fisheye_core.errors import CalibrationError
 from fisheye_undistort.circle_grid import find_circles
+from fisheye_undistort.estimate import TargetView
 from fisheye_undistort.grid_order import order_grid
-from fisheye_undistort.lens_fit import TargetView
 from fisheye_undistort.target import MARKERS, Target, marker_dictionary
 
 _MIN_CORNERS = 8

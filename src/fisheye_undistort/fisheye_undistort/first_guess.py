@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 
 from fisheye_geometry.lens import FisheyeLens
-from fisheye_undistort.lens_fit import Estimate, TargetView
+from fisheye_undistort.estimate import Estimate, TargetView
 from fisheye_undistort.sheet_model import UNKNOWNS, lens_of, project, to_camera
 
 _FOCAL_SCAN = np.geomspace(0.4, 4.0, 15)

@@ -7,7 +7,8 @@ import numpy as np
 
 from fisheye_geometry.image_circle import ImageCircle
 from fisheye_undistort.calibration import Calibration
-from fisheye_undistort.lens_fit import GROUPS, rms
+from fisheye_undistort.estimate import rms
+from fisheye_undistort.lens_fit import GROUPS
 from fisheye_undistort.sheet_model import INTRINSICS
 
 RING_DEG = 10

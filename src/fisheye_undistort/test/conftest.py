@@ -8,7 +8,7 @@ from rendered_view import render_view, scattered_poses
 
 from fisheye_geometry.lens import FisheyeLens
 from fisheye_testing.data import data_folder
-from fisheye_undistort.lens_fit import TargetView
+from fisheye_undistort.estimate import TargetView
 from fisheye_undistort.target import STANDARD
 
 

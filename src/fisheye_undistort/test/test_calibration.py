@@ -11,7 +11,7 @@ from fisheye_geometry.lens_surface import surface_for
 from fisheye_undistort.calibration import calibrate
 from fisheye_undistort.circle_bias import center_bias
 from fisheye_undistort.detection import Detector
-from fisheye_undistort.lens_fit import Estimate, TargetView
+from fisheye_undistort.estimate import Estimate, TargetView
 from fisheye_undistort.pictures import read_pictures
 from fisheye_undistort.sheet_model import warp_board
 from fisheye_undistort.target import STANDARD, Target

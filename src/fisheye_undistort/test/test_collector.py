@@ -3,7 +3,7 @@ import pytest
 
 from fisheye_core.errors import CalibrationError, ImageFormatError
 from fisheye_undistort.collector import Collector
-from fisheye_undistort.lens_fit import TargetView
+from fisheye_undistort.estimate import TargetView
 from fisheye_undistort.pictures import NamedPicture
 
 GRID = np.stack(np.meshgrid(np.arange(3), np.arange(3)), axis=-1).reshape(-1, 2) * 40.0

@@ -3,8 +3,9 @@ import pytest
 from conftest import seen_exactly
 from rendered_view import scattered_poses
 
+from fisheye_undistort.estimate import Estimate, TargetView
 from fisheye_undistort.first_guess import first_guess
-from fisheye_undistort.lens_fit import GROUPS, Estimate, FitProblem, TargetView, damp, fit
+from fisheye_undistort.lens_fit import GROUPS, FitProblem, damp, fit
 from fisheye_undistort.sheet_model import UNKNOWNS, lens_of, project, warp_board
 from fisheye_undistort.target import Target
 

@@ -7,7 +7,7 @@ from rendered_view import facing_pose, scattered_poses
 
 from fisheye_core.errors import FileAccessError
 from fisheye_undistort.calibration import calibrate
-from fisheye_undistort.lens_fit import TargetView
+from fisheye_undistort.estimate import TargetView
 from fisheye_undistort.report import CalibrationReport
 from fisheye_undistort.report_plot import plot_report
 from fisheye_undistort.target import Target
