@@ -2,6 +2,7 @@
 
 import os
 import signal
+import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterator
@@ -26,6 +27,8 @@ from fisheye_core.errors import FisheyeError
 
 _Node = TypeVar('_Node', bound=Node)
 
+_SWITCH_S = 0.0005
+"""A thread that measures in the background leaves Python's lock to the frames so often."""
 _LONGEST_WAIT_S = 0.2
 """A signal is noticed after so long at the latest."""
 _LONGEST_END_S = 1.2
@@ -72,6 +75,7 @@ class _Process:
 
     def run(self) -> int:
         """Return the exit code."""
+        sys.setswitchinterval(_SWITCH_S)
         try:
             refuse_words()
             while not self._ended.is_set():
