@@ -12,7 +12,7 @@ from field import START_S
 from namespaces import Namespace
 
 from fisheye_testing.health import usage
-from fisheye_testing.rig import SEPARATE, SIDES, RigProcesses
+from fisheye_testing.rig import SEPARATE, SIDES, RigProcesses, unused_domain
 from fisheye_testing.waiting import wait_for
 from fisheye_testing.watcher import Watcher
 
@@ -142,7 +142,7 @@ def test_a_starved_subscriber_starves_nobody_else(five, how):
 
 
 def test_two_systems_in_two_domains_do_not_meet(rig, watcher, domain, tmp_path):
-    other_domain = domain % 100 + 1
+    other_domain = unused_domain()
     with (
         RigProcesses(other_domain, tmp_path / 'other') as other,
         Watcher(other_domain) as other_watcher,

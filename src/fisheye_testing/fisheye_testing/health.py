@@ -17,6 +17,7 @@ _LONG_GAP_S = 0.4
 """Between two panoramas; shorter ones are the breath of a busy machine."""
 _STEP_PX = 8
 _START_S = 60.0
+_LOOKS = 5
 
 
 class SeenPanorama(NamedTuple):
@@ -115,8 +116,10 @@ class Usage(NamedTuple):
 
 
 def usage(pid: int) -> Usage:
-    """Return what a process uses now."""
+    """Return what a process uses now; what it opens for a moment only is not counted."""
     folder = Path(f'/proc/{pid}')
     resident, shared = (int(pages) / 256 for pages in (folder / 'statm').read_text().split()[1:3])
-    files, threads = (len(list((folder / part).iterdir())) for part in ('fd', 'task'))
+    files, threads = (
+        min(len(list((folder / part).iterdir())) for _ in range(_LOOKS)) for part in ('fd', 'task')
+    )
     return Usage(resident, shared, files, threads)

@@ -12,6 +12,7 @@ from collections import deque
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import IO
 
 from ament_index_python.packages import get_package_prefix
 
@@ -27,8 +28,10 @@ SEPARATE = ('left/capture', 'right/capture', 'left/undistort', 'right/undistort'
 """The five nodes of a rig; `COMPOSED` does the same in one."""
 COMPOSED = ('panorama',)
 _STOP_TIMEOUT_S = 10.0
-_domain_locks: deque = deque(maxlen=20)
-"""Open files whose locks keep the last domains picked here; what falls out is free again."""
+_domain_locks: deque[IO[str]] = deque()
+"""Open files whose locks keep the last domains picked here."""
+_MOST_DOMAINS = 20
+"""Domains picked before these are free for others again."""
 
 
 def executable(node: str) -> Path:
@@ -45,6 +48,8 @@ def unused_domain() -> int:
         with suppress(BlockingIOError):
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             _domain_locks.append(lock)
+            while len(_domain_locks) > _MOST_DOMAINS:
+                _domain_locks.popleft().close()
             return domain
         lock.close()
     raise RuntimeError('every ROS domain from 1 to 100 is in use by a test')
