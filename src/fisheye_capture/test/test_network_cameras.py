@@ -12,6 +12,7 @@ import pytest
 from fisheye_capture.source import SourceLostError
 from fisheye_capture.stream import StreamSource
 from fisheye_testing import network_camera
+from fisheye_testing.http_camera import HttpServer
 from fisheye_testing.painted_time import age_ms, read_image
 
 RATE_HZ = 20.0
@@ -217,6 +218,6 @@ def test_a_playlist_cannot_read_files_of_this_machine(open_stream, tmp_path):
     secret.write_bytes(b'G' * 10_000)
     playlist = tmp_path / 'live.m3u8'
     playlist.write_text(f'#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\nfile://{secret}\n')
-    served = network_camera.HttpServer(Namespace(port=0, password=''), folder=str(tmp_path))
+    served = HttpServer(Namespace(port=0, password=''), folder=str(tmp_path))
     with pytest.raises(SourceLostError):
         open_stream(f'{served.address}/live.m3u8', connect_timeout_s=2.0).read()
