@@ -46,21 +46,21 @@ class OverlapSettings:
     )
     min_overlap_deg: float = setting(
         5.0,
-        'Narrower overlaps are not looked for, deg.',
+        'Narrower overlaps are not looked for by correlation, deg.',
         minimum=2.0,
         maximum=90.0,
         live=True,
     )
     max_rise_deg: float = setting(
         4.0,
-        'How far the right view may lie above or below the left one, deg.',
+        'How far the right view may lie above or below the left one, by correlation, deg.',
         minimum=0.0,
         maximum=20.0,
         live=True,
     )
     correct_tilt: bool = setting(
         True,
-        'Measure and correct the small pitch and roll of the right camera.',
+        'Correct the pitch and roll of the right camera against the left one, as measured.',
         live=True,
     )
     paper_classes: int = setting(
