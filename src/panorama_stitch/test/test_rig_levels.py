@@ -60,6 +60,12 @@ def test_a_mount_that_looks_down_gets_a_straight_horizon():
     assert overlap.offset_y_px == pytest.approx(0.0, abs=1.5)
 
 
+@pytest.mark.parametrize(('expected_deg', 'found'), [(141.0, True), (120.0, False)])
+def test_an_expected_angle_is_one_about_the_vertical(expected_deg, found):
+    settings = replace(SETTINGS, expected_yaw_deg=expected_deg, yaw_tolerance_deg=2.0)
+    assert measured(seen(*TILTED), settings).overlaps[0].found == found
+
+
 def test_level_first_takes_the_first_camera_for_level():
     rig = measured(seen(*TILTED))
     first, _ = attitudes(rig, replace(SETTINGS, level='first'))

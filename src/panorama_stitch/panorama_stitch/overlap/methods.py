@@ -6,14 +6,16 @@ a line in `METHODS`.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import acos, isnan, pi, radians, sqrt
+from math import isnan, pi, radians, sqrt
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.lens import Lens
+from fisheye_geometry.level import levelled
 from fisheye_geometry.remap import remap_table
+from fisheye_geometry.rig import unwrapped
 from fisheye_geometry.surface import Surface
 from panorama_stitch.overlap import wording
 from panorama_stitch.overlap.corrected_overlap import grey_of, measure_corrected
@@ -159,10 +161,11 @@ def _is_wanted(attitude: Attitude, pair: PairInput, settings: OverlapSettings) -
     """Whether an attitude is one that the settings allow."""
     if pair.expected is not None or isnan(settings.expected_yaw_deg):
         return True
-    # Mounts that look up or down make the axes' angle smaller than the yaw about the vertical.
-    between_rad = acos(max(-1.0, min(1.0, float(attitude.matrix[2, 2]))))
-    yaw_between_rad = abs(between_rad - radians(settings.expected_yaw_deg))
-    return yaw_between_rad <= radians(settings.yaw_tolerance_deg) + _UNKNOWN_TILT_RAD / 2
+    # The angle is meant about the vertical, which mounts that look down alike tell.
+    left, right = (Attitude.of(level) for level in levelled([np.eye(3), attitude.matrix]))
+    yaw_rad = unwrapped([left.yaw_rad, right.yaw_rad])[1] - left.yaw_rad
+    apart_rad = abs(yaw_rad - radians(settings.expected_yaw_deg))
+    return apart_rad <= radians(settings.yaw_tolerance_deg)
 
 
 def _supported(attitude: Attitude, result, settings: OverlapSettings) -> Attitude:
