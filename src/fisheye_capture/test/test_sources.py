@@ -141,6 +141,11 @@ def test_an_empty_folder_is_named(settings, tmp_path):
         open_source(settings(tmp_path))
 
 
+def test_pictures_that_vanish_before_they_are_opened_are_named(settings, tmp_path):
+    with pytest.raises(SourceError, match=r"the pictures of '.*\*\.png' are not there any more"):
+        SOURCES['pictures'].open(settings(tmp_path / '*.png'))
+
+
 def test_a_device_that_is_not_there_may_come(settings):
     with pytest.raises(SourceLostError, match='there is no device /dev/video97'):
         open_source(settings('97'))
