@@ -41,7 +41,8 @@ class ImagePair:
             stitcher.place(side, lens, settings.surface_of(lens), settings.interpolation)
         if self.is_synthetic:
             offset_px = (YAWS[1] - YAWS[0]) * stitcher.surfaces[0].focal_px
-            stitcher.overlaps = [Overlap('true', True, offset_px, 0.0)]
+            attitude = Attitude(yaw_rad=YAWS[1] - YAWS[0])
+            stitcher.overlaps = [Overlap('true', True, offset_px, 0.0, attitude)]
         else:
             stitcher.overlaps = stitcher.measure([self.images], settings, settings.method)
         return stitcher
