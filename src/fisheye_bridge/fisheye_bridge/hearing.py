@@ -5,13 +5,14 @@ successor from opening it. The successor then sees the others, and nothing from 
 """
 
 from collections.abc import Callable
+from math import inf
 from time import monotonic
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 
 TOPIC = '/diagnostics'
-DEAF_S = 4.0
+DEAF_S = 6.0
 """Within this time several reports of each node are due."""
 _LOOK_S = 0.5
 _DEPTH = 10
@@ -19,7 +20,7 @@ _ENDLESS_S = 1e6
 
 
 class Hearing:
-    """Listens to the reports of other nodes until the first one comes.
+    """Listens for the reports of each other node, as one may be deaf to a single one of them.
 
     Only publishers that promise a report by their deadline count: those of our nodes.
     """
@@ -28,19 +29,22 @@ class Hearing:
         self._node, self._now_s = node, now_s
         self._name = node.get_fully_qualified_name()
         self._since_s: dict[bytes, float] = {}
+        self._heard_s: dict[str, float] = {}
         self._due_s = 0.0
-        self._subscription = node.create_subscription(DiagnosticArray, TOPIC, self._take, _DEPTH)
+        node.create_subscription(DiagnosticArray, TOPIC, self._take, _DEPTH)
 
     def silence(self) -> str:
-        """Return who can be seen, for some seconds, and is not heard; '' if all is well."""
+        """Return who can be seen, for some seconds, and was not heard; '' if all is well."""
         now_s = self._now_s()
-        if self._subscription is None or now_s < self._due_s:
+        if now_s < self._due_s:
             return ''
         self._due_s = now_s + _LOOK_S
         others = {bytes(end.endpoint_gid): _name(end) for end in self._others()}
         self._since_s = {gid: self._since_s.get(gid, now_s) for gid in others}
         silent = {
-            others[gid] for gid, since_s in self._since_s.items() if now_s - since_s > DEAF_S
+            others[gid]
+            for gid, since_s in self._since_s.items()
+            if now_s - since_s > DEAF_S and self._heard_s.get(others[gid], -inf) < since_s
         }
         names = ', '.join(sorted(name.lstrip('/') for name in silent))
         return f'{names} can be seen, but nothing comes from there' if names else ''
@@ -54,9 +58,7 @@ class Hearing:
         ]
 
     def _take(self, message: DiagnosticArray) -> None:
-        if self._subscription and any(s.hardware_id != self._name for s in message.status):
-            self._node.destroy_subscription(self._subscription)
-            self._subscription = None
+        self._heard_s.update({status.hardware_id: self._now_s() for status in message.status})
 
 
 def _name(end) -> str:

@@ -46,7 +46,9 @@ def run(node_class: type[Node]) -> int:
     Parameters
     ----------
     node_class
-        Built without arguments; a `FisheyeError` that it raises is logged.
+        Built without arguments; a `FisheyeError` that it raises is logged. Where it has to connect
+        anew another one is built with the same parameters, and given the former one, ended, as
+        the argument of its method `inherit` if it has that.
 
     Returns
     -------
@@ -66,6 +68,7 @@ class _Process:
     def __init__(self, node_class: type[Node]):
         self._node_class = node_class
         self._node: Node | None = None
+        self._former: Node | None = None
         self._parameters: list[Parameter] = []
         self._tries = 0
         self._parent = os.getppid() if os.environ.get(_BOUND) == '1' else None
@@ -117,14 +120,18 @@ class _Process:
                 names = self._node.get_parameters_by_prefix('')
                 self._parameters = self._node.get_parameters(list(names))
                 self._node.destroy_node()
-                self._node = None
+                self._node, self._former = None, self._node
             rclpy.try_shutdown()
             forget_machine()
 
     def _built(self) -> Node:
-        """Build the node, with the parameters that it had before."""
-        if self._parameters:
-            return self._node_class(parameter_overrides=self._parameters)
+        """Build the node, with the parameters that it had before and what it has found out."""
+        if self._former:
+            node = self._node_class(parameter_overrides=self._parameters)
+            if inherit := getattr(node, 'inherit', None):
+                inherit(self._former)
+            self._former = None
+            return node
         node = self._node_class()
         if complaint := misspelt(node):
             node.get_logger().warning(complaint)

@@ -10,7 +10,7 @@ from rclpy.executors import SingleThreadedExecutor
 from fisheye_bridge.hearing import DEAF_S, TOPIC, Hearing
 from fisheye_bridge.qos import HEARTBEAT
 
-WAIT_S = 20.0
+WAIT_S, LATER_S = 20.0, 1.0
 
 
 class NodePair:
@@ -60,13 +60,38 @@ def test_who_is_seen_and_not_heard_is_named(pair):
     assert pair.silence_after(DEAF_S) == 'other can be seen, but nothing comes from there'
 
 
-def test_who_was_heard_once_may_be_silent(pair):
+def hear_other(pair):
     def is_heard():
         pair.say('other')
-        return not pair.listener.count_subscribers(TOPIC)  # it listens no more
+        return 'other' not in pair.silence_after(LATER_S)
 
+    assert 'other' in pair.silence_after(2 * DEAF_S) + pair.silence_after(LATER_S)
     pair.spin_until(is_heard)
+
+
+def test_who_was_heard_once_may_be_silent(pair):
+    hear_other(pair)
     assert not pair.silence_after(10 * DEAF_S)
+
+
+def test_one_that_is_not_heard_beside_others_is_named(pair):
+    third = rclpy.create_node('third')
+    third.create_publisher(DiagnosticArray, TOPIC, HEARTBEAT)
+    pair.spin_until(lambda: pair.is_seen() == 2)
+    hear_other(pair)
+    assert pair.silence_after(2 * DEAF_S) == 'third can be seen, but nothing comes from there'
+    third.destroy_node()
+
+
+def test_one_that_was_started_again_is_to_be_heard_again(pair):
+    hear_other(pair)
+    pair.other.destroy_publisher(pair.publisher)
+    pair.spin_until(lambda: not pair.is_seen())
+    pair.publisher = pair.other.create_publisher(DiagnosticArray, TOPIC, HEARTBEAT)
+    pair.spin_until(pair.is_seen)
+    assert not pair.silence_after(LATER_S)
+    assert pair.silence_after(2 * DEAF_S) == 'other can be seen, but nothing comes from there'
+    hear_other(pair)
 
 
 @pytest.mark.parametrize('pair', [10], indirect=True)

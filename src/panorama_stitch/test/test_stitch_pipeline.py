@@ -204,6 +204,27 @@ def test_an_overlap_is_kept_in_its_file(make_line, pictures, tmp_path):
     assert 'the overlap is measured instead' in third.warnings[0]
 
 
+def test_a_pipeline_goes_on_with_the_overlap_of_the_former_one(make_line, pictures):
+    first = make_line()
+    first.feed(pictures, lambda: first.published, 'a panorama')
+    (measured,) = first.pipeline.overlaps
+    assert measured.found
+    first.stop()
+    second = make_line(replace(SETTINGS, auto_calibrate=False))
+    second.pipeline.inherit(first.pipeline)
+    second.feed(pictures, lambda: second.published, 'a panorama')
+    assert second.pipeline.overlaps == [measured]
+
+
+def test_overlaps_of_other_lenses_are_not_inherited(make_line, pictures):
+    first = make_line()
+    first.feed(pictures, lambda: first.published, 'a panorama')
+    second = make_line(replace(SETTINGS, auto_calibrate=False, hfov_deg=150.0))
+    second.pipeline.inherit(first.pipeline)
+    second.feed(pictures, lambda: second.published, 'a panorama')
+    assert not second.pipeline.overlaps[0].found
+
+
 def test_what_cannot_be_done_is_said(make_line, pictures, tmp_path):
     line = make_line()
     with pytest.raises(OverlapError, match='no pair of frames has come yet'):

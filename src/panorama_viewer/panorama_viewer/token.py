@@ -4,6 +4,7 @@ import os
 import re
 import secrets
 import stat
+from functools import cache
 from pathlib import Path
 
 from fisheye_core.errors import FileAccessError, FileContentError
@@ -14,8 +15,12 @@ _NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL
 _TOKEN = re.compile(r'[\w-]{8,100}', re.ASCII)
 
 
+@cache
 def new_token() -> str:
-    """Return a token that nobody can guess."""
+    """Return a token that nobody can guess, one for the life of the process.
+
+    Pages that are open know it, and come again when the node has connected anew.
+    """
     return secrets.token_urlsafe(12)
 
 

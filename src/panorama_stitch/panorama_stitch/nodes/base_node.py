@@ -87,6 +87,10 @@ class PanoramaBase(Node):
         """The current values of the parameters."""
         return self.pipeline.settings
 
+    def inherit(self, former: 'PanoramaBase') -> None:
+        """Go on with the overlaps of a node in whose place this one came."""
+        self.pipeline.inherit(former.pipeline)
+
     def destroy_node(self) -> None:
         """End the threads too."""
         self.pipeline.stop()

@@ -59,6 +59,7 @@ class CompositorBuilder:
         self._due_s = 0.0
         self._pause_s = _FIRST_PAUSE_S
         self._job: Future | None = None
+        self._inherited: tuple[list[Overlap], list[Surface]] | None = None
 
     def take(
         self,
@@ -113,6 +114,11 @@ class CompositorBuilder:
             that was found before stays in use. With a `FisheyeError` nothing has changed.
         """
         return self._background.do(self._calibrate, settings, method, save)
+
+    def inherit(self, former: RigState) -> None:
+        """Prefer overlaps that are known already to those of the overlap file."""
+        if former.overlaps and all(overlap.found for overlap in former.overlaps):
+            self._inherited = former.overlaps, former.surfaces
 
     def tell(self, sentence: str) -> None:
         """Note what did not work, for `take_notices`."""
@@ -212,6 +218,8 @@ class CompositorBuilder:
     def _read(self, path: str) -> None:
         rig = self._rig
         surfaces = rig.surfaces
+        if self._inherited and rig.set_overlaps(*self._inherited):
+            return
         try:
             if overlaps := read_overlaps(path, rig.cameras, surfaces):
                 rig.set_overlaps(overlaps, surfaces)

@@ -123,6 +123,10 @@ class StitchPipeline:
             if self.settings.level == 'imu':
                 self._builder.renew(forget=False)
 
+    def inherit(self, former: 'StitchPipeline') -> None:
+        """Use the overlaps of another pipeline where the cameras show what they showed there."""
+        self._builder.inherit(former.rig)
+
     def calibrate(self, method: str, save: bool) -> Future:
         """Measure the overlaps anew, off the frame path; as of `CompositorBuilder.calibrate`."""
         self._asked = self._builder.calibrate(self.settings, method, save)
