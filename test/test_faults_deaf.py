@@ -18,7 +18,7 @@ KILLS = 100 if os.environ.get('LONG') else 3
 NODES = ('left/capture', 'left/undistort', 'stitch')
 """Of one side: a new picture behind them has passed the one that was killed."""
 
-DEAF = 'left/capture can be seen, but nothing comes from there: connecting anew'
+DEAF = 'can be seen, but nothing comes from there: connecting anew'
 
 
 class Stamps:

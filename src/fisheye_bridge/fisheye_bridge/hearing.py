@@ -17,6 +17,8 @@ DEAF_S = 6.0
 _LOOK_S = 0.5
 _DEPTH = 10
 _ENDLESS_S = 1e6
+_NAMELESS = '_NODE_NAME_UNKNOWN_'
+"""What rcl calls a node that it has not been told of, or that was killed before."""
 
 
 class Hearing:
@@ -44,10 +46,16 @@ class Hearing:
         silent = {
             others[gid]
             for gid, since_s in self._since_s.items()
-            if now_s - since_s > DEAF_S and self._heard_s.get(others[gid], -inf) < since_s
+            if now_s - since_s > DEAF_S and self._heard_at_s(others[gid]) < since_s
         }
         names = ', '.join(sorted(name.lstrip('/') for name in silent))
         return f'{names} can be seen, but nothing comes from there' if names else ''
+
+    def _heard_at_s(self, name: str) -> float:
+        """Return when a node was last heard; one without a name yet may be any of those heard."""
+        if name.endswith(_NAMELESS):
+            return max(self._heard_s.values(), default=-inf)
+        return self._heard_s.get(name, -inf)
 
     def _others(self) -> list:
         """Return who else promises reports."""
@@ -58,7 +66,8 @@ class Hearing:
         ]
 
     def _take(self, message: DiagnosticArray) -> None:
-        self._heard_s.update({status.hardware_id: self._now_s() for status in message.status})
+        names = {status.hardware_id for status in message.status} - {self._name}
+        self._heard_s.update(dict.fromkeys(names, self._now_s()))
 
 
 def _name(end) -> str:

@@ -95,6 +95,7 @@ class _Process:
     def _live(self) -> None:
         """Spin a node until the end, or until it has to connect anew."""
         executor = None
+        bad_ports: list[str] = []
         links = Links()
         _init(self._node_class)
         try:
@@ -110,6 +111,7 @@ class _Process:
                 reason = links.changed(refresh)
                 if not reason and self._tries < _TRIES and (reason := hearing.silence()):
                     self._tries += 1
+                    bad_ports = shared_memory.own_ports()
                 if reason:
                     node.get_logger().warning(f'{reason}: connecting anew')
                     break
@@ -123,6 +125,7 @@ class _Process:
                 self._node, self._former = None, self._node
             rclpy.try_shutdown()
             forget_machine()
+            shared_memory.avoid(bad_ports)
 
     def _built(self) -> Node:
         """Build the node, with the parameters that it had before and what it has found out."""

@@ -52,6 +52,29 @@ def prepare(folder: Path = FOLDER) -> str:
     return f'{has}: pictures go over UDP, and some may be lost ({_REMEDY})'
 
 
+def own_ports() -> list[str]:
+    """Return the locks of the ports at which this process listens."""
+    held = []
+    for link in Path('/proc/self/fd').iterdir():
+        with suppress(OSError):
+            target = str(link.readlink())
+            if Path(target).name.startswith('fastrtps_port') and target.endswith('_el'):
+                held.append(target)
+    return held
+
+
+def avoid(ports: list[str]) -> None:
+    """Have Fast DDS take other ports in this process from now on, while no context is up.
+
+    Whoever has a wrong view of a port keeps it: its next owner would be as deaf. A port whose lock
+    is held is passed over.
+    """
+    for port in ports:
+        with suppress(OSError):
+            lock = os.open(port, os.O_RDONLY | os.O_CREAT | os.O_CLOEXEC, 0o666)
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)  # until the process ends
+
+
 def _room(folder: Path) -> int:
     """Return how many bytes can still be taken; 0 where nothing can be written."""
     try:

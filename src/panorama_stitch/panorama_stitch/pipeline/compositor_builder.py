@@ -12,6 +12,7 @@ import numpy as np
 
 from fisheye_core.background import Background
 from fisheye_core.errors import FisheyeError, OverlapError
+from fisheye_geometry.surface import Surface
 from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.overlap.overlap_file import read_overlaps, write_overlaps
 from panorama_stitch.overlap.overlap_result import Overlap
