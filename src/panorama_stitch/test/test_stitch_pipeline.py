@@ -168,6 +168,18 @@ def test_panoramas_go_on_while_the_overlap_is_measured(make_line, pictures):
     assert answer.result()[0].found
 
 
+def test_who_asks_again_meanwhile_gets_the_same_measurement(make_line, pictures):
+    line = make_line()
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    first = line.pipeline.calibrate('correlation', save=False)
+    assert line.pipeline.calibrate('correlation', save=False) is first
+    other = line.pipeline.calibrate('', save=False)
+    assert other is not first
+    line.feed(pictures, other.done, 'an answer')
+    assert first.result()[0].found
+    assert line.pipeline.calibrate('', save=False) is not other
+
+
 def test_an_answer_without_overlap_never_replaces_a_good_one(make_line, pictures):
     line = make_line()
     line.feed(pictures, lambda: line.published, 'a panorama')

@@ -7,6 +7,7 @@ fix the one at which the far scene agrees.
 from collections.abc import Sequence
 from math import pi, radians
 
+import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -39,6 +40,8 @@ _REDUNDANT = 4.0
 """Each place of the overlap is in so many patches."""
 _LENS_RAD = radians(0.02)
 """No lens is calibrated better."""
+_BODY_WIDTH_PX = 640
+"""A body that moves with the cameras is looked for in images about as wide, or a little wider."""
 
 
 def measure_rotation(
@@ -133,7 +136,16 @@ def _usable(left, right):
     """Of either view: 255 where it shows the scene, and not what moves with both cameras."""
     usable = [left.usable, right.usable]
     if _alike(left, right):
-        body = static_mask(left.grey, right.grey, (usable[0] & usable[1]) > 0)
+        height, width = left.grey.shape
+        step = max(1, width // _BODY_WIDTH_PX)
+        size = (width // step, max(1, height // step))
+        small = [
+            cv2.resize(grey, size, interpolation=cv2.INTER_AREA)
+            for grey in (left.grey, right.grey)
+        ]
+        seen = cv2.resize(usable[0] & usable[1], size, interpolation=cv2.INTER_NEAREST)
+        body = static_mask(*small, seen > 0).astype(np.uint8)
+        body = cv2.resize(body, (width, height), interpolation=cv2.INTER_NEAREST)
         usable = [np.where(body, 0, seen).astype(np.uint8) for seen in usable]
     return tuple(usable)
 

@@ -74,6 +74,7 @@ class StitchPipeline:
         self._builder = CompositorBuilder(self.rig, self.watch)
         self._gravity = Gravity()
         self._asked: Future | None = None
+        self._asked_what: tuple | None = None
         self._dimensions = 0
 
     def take(self, camera: str, stamp_ns: int, image: np.ndarray, encoding: str) -> None:
@@ -128,8 +129,15 @@ class StitchPipeline:
         self._builder.inherit(former.rig)
 
     def calibrate(self, method: str, save: bool) -> Future:
-        """Measure the overlaps anew, off the frame path; as of `CompositorBuilder.calibrate`."""
-        self._asked = self._builder.calibrate(self.settings, method, save)
+        """Measure the overlaps anew, off the frame path; as of `CompositorBuilder.calibrate`.
+
+        Whoever asks for the same while it is being measured gets that result: on a slow machine,
+        one who asks again does not wait behind what nobody waits for any more.
+        """
+        what = self.settings, method, save
+        if self._asked is None or self._asked.done() or self._asked_what != what:
+            self._asked_what = what
+            self._asked = self._builder.calibrate(*what)
         return self._asked
 
     def leave_room(self, took_s: float) -> None:
