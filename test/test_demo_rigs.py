@@ -50,7 +50,9 @@ def test_a_ring_of_synthetic_cameras_is_closed_and_level(rig, watcher):
         'a closed panorama',
     )
     wait_for(
-        lambda: all(each.found for each in watcher.overlaps.overlaps), START_S, 'its overlaps'
+        lambda: watcher.overlaps and all(each.found for each in watcher.overlaps.overlaps),
+        START_S,
+        'its overlaps',
     )
     for overlap, true in zip(watcher.overlaps.overlaps, known.between(), strict=True):
         assert overlap.found
