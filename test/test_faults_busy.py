@@ -13,7 +13,7 @@ from fisheye_testing.waiting import wait_for
 
 LARGE = {'width': 1920, 'height': 1440}
 """Pictures of this size keep a measurement busy for a while."""
-TRIES = 5
+TRIES = 3
 
 
 @pytest.fixture
