@@ -64,7 +64,7 @@ def own_ports() -> list[str]:
 
 
 def avoid(ports: list[str]) -> None:
-    """Have Fast DDS take other ports in this process from now on, while no context is up.
+    """Hold the locks of ports, so that Fast DDS opens others; call it while no context is up.
 
     Whoever has a wrong view of a port keeps it: its next owner would be as deaf. A port whose lock
     is held is passed over.
