@@ -11,6 +11,7 @@ from collections import Counter, OrderedDict
 from collections.abc import Callable
 from errno import EADDRNOTAVAIL, EAFNOSUPPORT
 from ipaddress import ip_address, ip_network
+from itertools import islice
 
 from aiohttp import web
 
@@ -26,6 +27,9 @@ _PAUSE_S = 0.2
 """When the process has no more descriptors, and no stranger holds one."""
 _CONNECTS, _CONNECTS_PER_S = 300, 200.0
 """Of one address; the page takes about fifteen."""
+_MAX_REFUSED, _REFUSED_S = 256, 1.0
+"""How many beyond that are held, and how long: who is told at once is back at once, again and
+again, and others of the same address hardly get a turn."""
 _MAX_ADDRESSES = 1000
 
 
@@ -40,6 +44,7 @@ class Gate:
         self._connections: dict[asyncio.BaseTransport, Connection] = {}
         self._strangers: dict[Connection, None] = {}
         self._allowances: OrderedDict[str, Allowance] = OrderedDict()
+        self._refused: dict[socket.socket, None] = {}
 
     async def open(self, host: str, port: int, serve: Callable[[], asyncio.Protocol]) -> int:
         """Listen on every address of a host, and return the port.
@@ -82,6 +87,7 @@ class Gate:
         self._listeners.clear()
         for stranger in list(self._strangers):
             stranger.abort()
+        self._let_go(len(self._refused))
 
     def connection(self, request: web.Request) -> Connection:
         """Return what a request came over; a `ConnectionError` if that has ended."""
@@ -113,7 +119,9 @@ class Gate:
                 return
             except OSError as error:
                 self._faults.add(error)
-                if self._strangers:
+                if self._refused:
+                    self._let_go(len(self._refused))
+                elif self._strangers:
                     self._make_room(_AT_ONCE)  # which is there when this is called again
                 else:
                     self._loop.remove_reader(listener)
@@ -128,7 +136,7 @@ class Gate:
     def _admit(self, taken: socket.socket, address: str) -> None:
         source = _source(address)
         if not self._allowance(source).take(1, self._loop.time()):
-            taken.close()
+            self._refuse(taken)
             return
         self._make_room(len(self._strangers) + 1 - MAX_STRANGERS)
         taken.setblocking(False)
@@ -139,6 +147,21 @@ class Gate:
         )
         self._entering.add(entering)
         entering.add_done_callback(self._entering.discard)
+
+    def _refuse(self, taken: socket.socket) -> None:
+        """Hold a connection for a while, then close it."""
+        self._let_go(len(self._refused) + 1 - _MAX_REFUSED)
+        self._refused[taken] = None
+        self._loop.call_later(_REFUSED_S, self._close, taken)
+
+    def _let_go(self, count: int) -> None:
+        """Close the oldest of those that are held."""
+        for taken in list(islice(self._refused, max(0, count))):
+            self._close(taken)
+
+    def _close(self, taken: socket.socket) -> None:
+        self._refused.pop(taken, None)
+        taken.close()
 
     def _allowance(self, source: str) -> Allowance:
         allowance = self._allowances.pop(source, None)
