@@ -11,6 +11,7 @@ from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.level import Mount
 from panorama_stitch.pipeline.panorama_settings import PanoramaSettings
+from panorama_stitch.pipeline.rig_measurement import measure_overlaps
 from panorama_stitch.pipeline.rig_state import RigState
 
 LENS = synthetic_lens(480, 360, np.radians(170))
@@ -37,7 +38,7 @@ def rig_of(count, mounts=(), mask_files=()):
 
 def measured(images, settings=SETTINGS, **known):
     rig = rig_of(len(images), **known)
-    rig.overlaps = rig.measure([images], settings, 'particles')
+    rig.overlaps = measure_overlaps(rig, [images], settings, 'particles')
     return rig
 
 

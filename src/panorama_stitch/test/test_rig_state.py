@@ -13,6 +13,7 @@ from fisheye_core.errors import GeometryError, OverlapError
 from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.image_circle import ImageCircle
 from panorama_stitch.pipeline.panorama_settings import PanoramaSettings
+from panorama_stitch.pipeline.rig_measurement import measure_overlaps
 from panorama_stitch.pipeline.rig_state import RigState
 
 YAW = np.radians(140)
@@ -35,7 +36,7 @@ def stitcher_of(lenses=(LENS, LENS), names=('left', 'right')):
 
 def test_it_measures_the_offset_of_the_synthetic_rig(pictures):
     stitcher = stitcher_of()
-    (overlap,) = stitcher.measure([pictures], SETTINGS, 'particles')
+    (overlap,) = measure_overlaps(stitcher, [pictures], SETTINGS, 'particles')
     assert overlap.found
     assert overlap.offset_x_px == pytest.approx(YAW * LENS.focal_x_px, abs=CLOSE_PX)
     assert overlap.offset_y_px == pytest.approx(0, abs=CLOSE_PX)
@@ -47,7 +48,7 @@ def test_cameras_of_different_focal_length_get_one(pictures):
     stitcher = stitcher_of((LENS, longer))
     left_surface, right_surface = stitcher.surfaces
     assert left_surface.focal_px == right_surface.focal_px
-    (overlap,) = stitcher.measure([[pictures[0], right]], SETTINGS, 'particles')
+    (overlap,) = measure_overlaps(stitcher, [[pictures[0], right]], SETTINGS, 'particles')
     expected = YAW * LENS.focal_x_px + left_surface.center_x_px - right_surface.center_x_px
     assert overlap.offset_x_px == pytest.approx(expected, abs=CLOSE_PX)
 
@@ -60,7 +61,7 @@ def test_without_a_measurement_the_frames_stand_side_by_side(pictures):
 
 def test_an_offset_set_by_hand_wins_and_nan_gives_the_measured_one_back(pictures):
     stitcher = stitcher_of()
-    stitcher.overlaps = stitcher.measure([pictures], SETTINGS, 'particles')
+    stitcher.overlaps = measure_overlaps(stitcher, [pictures], SETTINGS, 'particles')
     by_hand = stitcher.effective_overlaps(
         replace(SETTINGS, offset_x_px=(500.0,), offset_y_px=(nan,))
     )[0]
@@ -71,7 +72,7 @@ def test_an_offset_set_by_hand_wins_and_nan_gives_the_measured_one_back(pictures
 
 def test_another_surface_makes_the_overlap_void(pictures):
     stitcher = stitcher_of()
-    stitcher.overlaps = stitcher.measure([pictures], SETTINGS, 'particles')
+    stitcher.overlaps = measure_overlaps(stitcher, [pictures], SETTINGS, 'particles')
     assert not stitcher.place('left', LENS, SETTINGS.surface_of(LENS)), 'nothing new'
     assert stitcher.overlaps
     assert stitcher.place('left', LENS, replace(SETTINGS, hfov_deg=150.0).surface_of(LENS))
@@ -81,7 +82,7 @@ def test_another_surface_makes_the_overlap_void(pictures):
 def test_what_was_measured_on_other_surfaces_is_not_taken(pictures):
     stitcher = stitcher_of()
     surfaces = stitcher.surfaces
-    overlaps = stitcher.measure([pictures], SETTINGS, 'particles')
+    overlaps = measure_overlaps(stitcher, [pictures], SETTINGS, 'particles')
     stitcher.place('left', LENS, replace(SETTINGS, hfov_deg=150.0).surface_of(LENS))
     assert not stitcher.set_overlaps(overlaps, surfaces)
     assert stitcher.overlaps is None
@@ -99,14 +100,14 @@ def test_a_surface_that_would_become_absurd_is_refused():
 
 def test_nothing_to_measure_on_is_said(pictures):
     with pytest.raises(OverlapError, match='no pair of frames has come yet'):
-        stitcher_of().measure([], SETTINGS, 'particles')
+        measure_overlaps(stitcher_of(), [], SETTINGS, 'particles')
 
 
 def test_three_cameras():
     yaws = np.radians([-120, 0, 120])
     pictures = [Scene().view(LENS, Attitude(yaw_rad=yaw)).frame(0) for yaw in yaws]
     stitcher = stitcher_of((LENS,) * 3, ('left', 'middle', 'right'))
-    stitcher.overlaps = stitcher.measure([pictures], SETTINGS, 'correlation')
+    stitcher.overlaps = measure_overlaps(stitcher, [pictures], SETTINGS, 'correlation')
     expected = pytest.approx(np.radians(120) * LENS.focal_x_px, abs=CLOSE_PX)
     assert [overlap.offset_x_px for overlap in stitcher.overlaps] == [expected] * 3
     compositor = stitcher.compositor(SETTINGS, pictures)
@@ -133,7 +134,7 @@ def over_jpeg(picture, quality):
 @pytest.mark.parametrize('quality', [95, 80, 60])
 def test_jpeg_makes_no_tilt(pictures, quality):
     received = [over_jpeg(picture, quality) for picture in pictures]
-    (overlap,) = stitcher_of().measure([received], SETTINGS, 'particles')
+    (overlap,) = measure_overlaps(stitcher_of(), [received], SETTINGS, 'particles')
     assert abs(overlap.attitude.pitch_rad) < np.radians(0.05)
     assert abs(overlap.attitude.roll_rad) < np.radians(0.05)
     assert abs(overlap.offset_y_px) < 0.1
@@ -142,6 +143,6 @@ def test_jpeg_makes_no_tilt(pictures, quality):
 def test_a_small_tilt_is_measured():
     turns = Attitude(yaw_rad=-YAW / 2), Attitude(YAW / 2, np.radians(0.3), np.radians(0.2))
     tilted = [Scene().view(LENS, turn).frame(0) for turn in turns]
-    (overlap,) = stitcher_of().measure([tilted], SETTINGS, 'particles')
+    (overlap,) = measure_overlaps(stitcher_of(), [tilted], SETTINGS, 'particles')
     assert np.degrees(overlap.attitude.pitch_rad) == pytest.approx(0.3, abs=0.1)
     assert np.degrees(overlap.attitude.roll_rad) == pytest.approx(0.2, abs=0.1)

@@ -5,7 +5,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scenes import data_folder
 
 from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens
@@ -16,6 +15,7 @@ from fisheye_geometry.level import levelled
 from fisheye_geometry.remap import RemapTable
 from fisheye_geometry.rig import chain
 from fisheye_geometry.rig_solution import solve_rig
+from fisheye_testing.data import real_data
 from panorama_stitch.compose.blends import BLENDS
 from panorama_stitch.compose.build import Style, build_compositor
 from panorama_stitch.compose.layout import covered
@@ -187,7 +187,7 @@ def test_gain_compensation_closes_the_ring(gains):
 
 
 def test_the_field_data_follow_the_same_conventions():
-    for path in sorted(data_folder('field').glob('*/truth.json')):
+    for path in sorted(real_data('field').glob('*/truth.json')):
         truth = json.loads(path.read_text())
         attitudes = [np.reshape(truth['attitude'][name], (3, 3)) for name in truth['cameras']]
         for name, matrix in zip(truth['cameras'], attitudes, strict=True):

@@ -8,6 +8,7 @@ from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.attitude import Attitude
 from panorama_stitch.overlap.monitor import SeamState
 from panorama_stitch.pipeline.panorama_settings import PanoramaSettings
+from panorama_stitch.pipeline.rig_measurement import measure_overlaps
 from panorama_stitch.pipeline.rig_state import RigState
 from panorama_stitch.pipeline.seam_watch import SeamWatch
 
@@ -28,7 +29,7 @@ def rig():
     rig = RigState(('left', 'right'))
     for camera in rig.cameras:
         rig.place(camera, LENS, SETTINGS.surface_of(LENS))
-    rig.overlaps = rig.measure([seen()], SETTINGS, 'particles')
+    rig.overlaps = measure_overlaps(rig, [seen()], SETTINGS, 'particles')
     return rig
 
 

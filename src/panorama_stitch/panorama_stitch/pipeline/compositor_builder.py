@@ -18,6 +18,7 @@ from panorama_stitch.overlap.overlap_file import read_overlaps, write_overlaps
 from panorama_stitch.overlap.overlap_result import Overlap
 from panorama_stitch.pipeline.overlap_choice import believed, kept
 from panorama_stitch.pipeline.panorama_settings import PanoramaOutputSettings
+from panorama_stitch.pipeline.rig_measurement import measure_overlaps
 from panorama_stitch.pipeline.rig_state import RigState
 from panorama_stitch.pipeline.seam_watch import SeamWatch
 
@@ -209,7 +210,7 @@ class CompositorBuilder:
         self, remembered: list[_Remembered], settings: PanoramaOutputSettings, method: str
     ) -> list[Overlap]:
         images = [frames.images for frames in remembered]
-        overlaps = self._watch.sharpened(self._rig.measure(images, settings, method))
+        overlaps = self._watch.sharpened(measure_overlaps(self._rig, images, settings, method))
         return [replace(overlap, stamp_ns=remembered[-1].stamp_ns) for overlap in overlaps]
 
     def _use(self, newest: _Remembered, settings: PanoramaOutputSettings) -> None:

@@ -109,10 +109,8 @@ class FrameSets:
         """Make `get`, now and later, return None."""
         self._waiting.close()
 
-    def shown(self, frames: FrameSet) -> list[np.ndarray]:
+    def dimmed(self, frames: FrameSet) -> list[np.ndarray]:
         """Return the images of a frame set, stale ones dimmed, all in colour if one is."""
-        if not frames.ages_s:
-            return alike(frames.images)
         return alike(
             [
                 self._stale.dim(camera, image) if camera in frames.ages_s else image

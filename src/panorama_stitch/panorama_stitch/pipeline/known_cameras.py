@@ -12,6 +12,9 @@ from fisheye_geometry.surface import Surface
 from panorama_stitch.compose.mask import read_mask
 from panorama_stitch.overlap.methods import CameraView
 
+Images = Sequence[np.ndarray]
+"""One image of each camera, taken at the same time."""
+
 
 class KnownCameras:
     """What the images of each camera show, and where they show the robot itself.

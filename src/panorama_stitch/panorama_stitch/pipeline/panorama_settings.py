@@ -1,6 +1,5 @@
 """Settings of the two nodes that make panoramas: the only place with their defaults."""
 
-import re
 from dataclasses import dataclass
 from math import isnan, nan, radians
 
@@ -8,13 +7,12 @@ from fisheye_capture.capture_settings import FrameSettings
 from fisheye_core.errors import SettingError
 from fisheye_core.settings import setting
 from fisheye_geometry.level import LEVELS, Mount
-from fisheye_geometry.rig import MAX_CAMERAS, RINGS
+from fisheye_geometry.rig import CAMERA_NAME, MAX_CAMERAS, RINGS
 from fisheye_undistort.undistort_settings import SurfaceSettings
 from panorama_stitch.compose.blends import BLENDS
 from panorama_stitch.compose.layout import CROPS
 from panorama_stitch.overlap.overlap_settings import OverlapSettings
 
-_NAME = re.compile(r'[A-Za-z]\w*(/[A-Za-z]\w*)*', re.ASCII)
 """Of a camera: it is a namespace."""
 
 
@@ -141,7 +139,7 @@ class PanoramaOutputSettings(OverlapSettings):
                 f'cameras is {list(cameras)}; expected 1 to {MAX_CAMERAS} different names'
             )
         for name in cameras:
-            if not _NAME.fullmatch(name):
+            if not CAMERA_NAME.fullmatch(name):
                 raise SettingError(
                     f"cameras has '{name}'; expected a letter, then letters, digits or _"
                 )

@@ -175,7 +175,7 @@ class StitchPipeline:
             return []
         solution = self.rig.solution(overlaps, self.settings)
         apart = ['no overlap: frames are side by side'] if solution.rig.apart else []
-        return [*apart, *(words for words in solution.messages if 'is closed; it' not in words)]
+        return [*apart, *solution.faults]
 
     @property
     def trouble(self) -> str:
@@ -201,9 +201,10 @@ class StitchPipeline:
         compositor = self.compositor
         if compositor is None or not compositor.fits(images):
             return None
-        if not frames.ages_s and self.watch.is_due:
+        if frames.ages_s:
+            images = self.frames.dimmed(frames)
+        elif self.watch.is_due:
             self.watch.take(images, self.overlaps)
-        images = self.frames.shown(frames)
         stale = {
             camera: (compositor.layout.shown_columns(cameras.index(camera)), age_s)
             for camera, age_s in frames.ages_s.items()
