@@ -7,6 +7,7 @@ import numpy as np
 from fisheye_core.errors import GeometryError
 from fisheye_geometry.attitude import LEVEL, Attitude
 from fisheye_geometry.lens import Lens
+from fisheye_geometry.remap import on_picture
 from fisheye_geometry.surface import SURFACES, Surface
 from fisheye_geometry.surface_kind import KINDS
 
@@ -109,9 +110,7 @@ def _sees(
 ) -> np.ndarray:
     """Whether a camera sees anything in directions of a level frame."""
     x, y, z = KINDS['equirectangular'].rays(azimuths, -elevations)
-    pixels, seen = lens.project(np.stack([x, y, z], axis=-1) @ attitude.matrix)
-    last = np.array([lens.width, lens.height]) - 0.5
-    return seen & np.all((pixels >= -0.5) & (pixels <= last), axis=-1)
+    return on_picture(lens, np.stack([x, y, z], axis=-1) @ attitude.matrix)[1]
 
 
 def _extent(

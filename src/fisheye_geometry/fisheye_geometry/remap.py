@@ -174,14 +174,21 @@ def remap_table(
     return RemapTable(source, surface, interpolation, attitude)
 
 
+def on_picture(source: Lens | Surface, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the pixels (..., 2) of rays (..., 3) of a source, and which lie on its picture."""
+    pixels, seen = source.project(rays)
+    # A pixel is half a pixel wide to each side.
+    last = np.array([source.width, source.height]) - 0.5
+    return pixels, seen & np.all((pixels >= -0.5) & (pixels <= last), axis=-1)
+
+
 def _source_pixels(
     source: Lens | Surface, surface: Surface, attitude: Attitude, rows: slice
 ) -> tuple[np.ndarray, np.ndarray]:
     """Pixels (rows, width, 2) float32 of the source's picture, and where there are any."""
     y, x = np.ogrid[rows, : surface.width]
-    pixels, seen = source.project(surface.rays(x, y) @ attitude.matrix)
+    pixels, seen = on_picture(source, surface.rays(x, y) @ attitude.matrix)
+    # Beyond its centre the outermost pixel is repeated.
     last = np.array([source.width - 1, source.height - 1])
-    # A pixel is half a pixel wide to each side; beyond its centre the outermost is repeated.
-    seen &= np.all((pixels >= -0.5) & (pixels <= last + 0.5), axis=-1)
     where = np.where(seen[..., None], np.clip(pixels, 0, last), _OUTSIDE_PX)
     return where.astype(np.float32), seen

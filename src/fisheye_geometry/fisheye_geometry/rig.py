@@ -4,6 +4,7 @@ All rays are of the rig's level frame: y straight down, z forward, x right. Pair
 come from `pairs_of` alone; whatever is kept for each pair follows its order.
 """
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -18,6 +19,8 @@ from fisheye_geometry.lens import Lens
 from fisheye_geometry.surface import Surface
 
 MAX_CAMERAS = 8
+CAMERA_NAME = re.compile(r'[A-Za-z]\w*(/[A-Za-z]\w*)*', re.ASCII)
+"""It is a namespace."""
 RINGS = ('auto', 'open', 'closed')
 MAX_RESIDUE_RAD = np.radians(3.0)
 """Rotations that miss the way around by more do not belong to one ring."""
@@ -36,6 +39,11 @@ def pairs_of(cameras: int, is_closed: bool = False) -> tuple[Pair, ...]:
     """Return the neighbours among cameras that stand from left to right, the closing pair last."""
     pairs = tuple(Pair(*pair) for pair in pairwise(range(cameras)))
     return (*pairs, Pair(cameras - 1, 0)) if is_closed and cameras > 1 else pairs
+
+
+def pairs_for(cameras: int, entries: int) -> tuple[Pair, ...]:
+    """Return the pairs that so many entries are for: as many as cameras if a ring is closed."""
+    return pairs_of(cameras, entries == cameras)
 
 
 @dataclass(frozen=True)

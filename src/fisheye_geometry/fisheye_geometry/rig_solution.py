@@ -25,11 +25,14 @@ class RigSolution:
         By how much the rotations missed the way around a ring.
     messages
         Sentences.
+    faults
+        Those of the messages that tell what is wrong; that a ring is closed is well.
     """
 
     rig: Rig
     residue_rad: float
     messages: tuple[str, ...]
+    faults: tuple[str, ...]
 
 
 def solve_rig(
@@ -89,7 +92,8 @@ def solve_rig(
             apart.append(index)
         known.append(rotation)
     found = chain(known, None if apart else closing, ring='open' if apart else ring)
-    messages += [found.message] if found.message else []
+    faults = messages if found.is_closed or not found.message else [*messages, found.message]
+    messages = [*messages, found.message] if found.message else messages
     attitudes = levelled(
         found.attitudes,
         'none' if apart else level,
@@ -106,4 +110,4 @@ def solve_rig(
         found.is_closed,
         tuple(apart),
     )
-    return RigSolution(rig, found.residue_rad, tuple(messages))
+    return RigSolution(rig, found.residue_rad, tuple(messages), tuple(faults))

@@ -7,7 +7,7 @@ import numpy as np
 
 from fisheye_core.errors import CalibrationError
 from fisheye_geometry.lens import FisheyeLens
-from fisheye_undistort.estimate import Estimate, TargetView
+from fisheye_undistort.estimate import Estimate, TargetView, rms
 from fisheye_undistort.model_fitter import ModelFitter
 from fisheye_undistort.sheet_model import UNKNOWNS, lens_of, to_camera, warp_board
 from fisheye_undistort.target import Target
@@ -45,8 +45,7 @@ class Calibration:
     @property
     def rms_px(self) -> float:
         """Root mean square distance of all points from where the model puts them."""
-        squares = np.concatenate([np.sum(r**2, axis=-1) for r in self.estimate.residuals_px])
-        return float(np.sqrt(squares.mean()))
+        return rms(np.concatenate(self.estimate.residuals_px))
 
     @property
     def deviations(self) -> dict[str, float]:

@@ -52,13 +52,7 @@ class CalibrationReport:
         lens = self.calibration.lens
         circle = ImageCircle(lens)
         circle.look(self.brightest)
-        middle = [
-            (-0.5, lens.center_y_px),
-            (lens.width - 0.5, lens.center_y_px),
-            (lens.center_x_px, -0.5),
-            (lens.center_x_px, lens.height - 0.5),
-        ]
-        return min(circle.angle_rad, max(lens.angle_at(x, y) for x, y in middle))
+        return min(circle.angle_rad, max(lens.field_rad()))
 
     @cached_property
     def coverage(self) -> np.ndarray:

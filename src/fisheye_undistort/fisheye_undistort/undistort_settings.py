@@ -1,12 +1,13 @@
 """Settings of the correction: the only place with their defaults."""
 
 from dataclasses import dataclass
-from math import isnan, nan, radians
+from math import nan, radians
 
 from fisheye_core.settings import setting
 from fisheye_geometry.attitude import LEVEL, Attitude
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.lens_surface import SCALES, surface_for
+from fisheye_geometry.level import Mount
 from fisheye_geometry.remap import INTERPOLATIONS
 from fisheye_geometry.surface import SURFACES, Surface
 
@@ -118,17 +119,13 @@ class UndistortSettings(SurfaceSettings):
     @property
     def tilt(self) -> Attitude:
         """Attitude of the camera in the frame of its corrected picture, which is level."""
-        return Attitude(0.0, _known_rad(self.pitch_deg), _known_rad(self.roll_deg))
+        return Mount(0.0, radians(self.pitch_deg), radians(self.roll_deg)).attitude
 
     @property
     def orientation(self) -> Attitude:
         """Attitude of the corrected picture in the level frame in which the camera is mounted."""
-        return Attitude(_known_rad(self.yaw_deg))
+        return Mount(radians(self.yaw_deg), 0.0, 0.0).attitude
 
     @property
     def _size(self) -> tuple[int, int]:
         return self.width, self.height
-
-
-def _known_rad(angle_deg: float) -> float:
-    return 0.0 if isnan(angle_deg) else radians(angle_deg)

@@ -7,7 +7,7 @@ import pytest
 from rendered_view import render_view, scattered_poses
 
 from fisheye_geometry.lens import FisheyeLens
-from fisheye_testing.data import data_folder
+from fisheye_testing.data import real_data
 from fisheye_undistort.estimate import TargetView
 from fisheye_undistort.target import STANDARD
 
@@ -38,7 +38,7 @@ def seen_exactly(lens, target, pose, name='view') -> TargetView:
 @pytest.fixture
 def shun74() -> Path:
     """Return the folder of real chessboard views."""
-    return data_folder('shun74')
+    return real_data('shun74')
 
 
 @pytest.fixture(scope='session')

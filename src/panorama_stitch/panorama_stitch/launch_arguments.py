@@ -1,7 +1,6 @@
 """What panorama.launch.py takes: its arguments, read and checked."""
 
 import os
-import re
 from collections.abc import Sequence
 from contextlib import suppress
 from math import isfinite, radians
@@ -12,6 +11,7 @@ from ament_index_python.packages import get_package_share_directory
 
 from fisheye_core.errors import SettingError
 from fisheye_geometry.attitude import Attitude
+from fisheye_geometry.rig import CAMERA_NAME, MAX_CAMERAS
 from panorama_stitch.overlap.saved_rig import saved_rig
 
 CONFIG = Path(get_package_share_directory('panorama_stitch')) / 'config'
@@ -39,8 +39,6 @@ OF_CAMERA = {
 FLAGS = tuple(name for name, (value, _) in ARGUMENTS.items() if value == 'false')
 OF_LAUNCH = ('launch-prefix', 'launch-prefix-filter', 'emulate_tty', 'ros_namespace')
 """What launch itself and launch_ros take beside a file's own arguments."""
-MAX_CAMERAS = 8
-NAME = r'[A-Za-z]\w*(/[A-Za-z]\w*)*'
 YES, NO = ('true', '1', 'yes', 'on'), ('false', '0', 'no', 'off')
 
 
@@ -48,7 +46,7 @@ def camera_names(text: str) -> list[str]:
     """Read the names of the cameras."""
     names = [name.strip() for name in text.split(',')]
     for name in names:
-        if not re.fullmatch(NAME, name, re.ASCII):
+        if not CAMERA_NAME.fullmatch(name):
             raise SettingError(
                 f"cameras has '{name}'; expected names of a letter, then letters, digits or _, "
                 'with commas between them'

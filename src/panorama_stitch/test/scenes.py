@@ -12,7 +12,7 @@ from fisheye_geometry.lens import FisheyeLens
 from fisheye_geometry.lens_surface import surface_for
 from fisheye_geometry.remap import RemapTable
 from fisheye_geometry.surface import Surface
-from fisheye_testing.data import data_folder
+from fisheye_testing.data import real_data
 from panorama_stitch.compose.placing import place
 from panorama_stitch.compose.posing import views_at_overlaps
 from panorama_stitch.compose.view import View
@@ -96,7 +96,7 @@ def masked(picture: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 def real_views(name: str, kind: str = 'cylindrical', turn: Attitude = LEVEL):
     """Return ((left, right) grey, surfaces) of a rig of real pictures, the right one turned."""
-    folder = data_folder('rigs') / name
+    folder = real_data('rigs') / name
     pictures, surfaces = [], []
     for side, attitude in (('left', LEVEL), ('right', turn)):
         camera = read_camera(folder / f'{side}.yaml').lens

@@ -16,6 +16,7 @@ from fisheye_core.settings import rules
 from fisheye_geometry.attitude import Attitude
 from panorama_stitch.compose.blends import BLENDS
 from panorama_stitch.pipeline.panorama_settings import PanoramaOutputSettings, PanoramaSettings
+from panorama_stitch.pipeline.rig_measurement import measure_overlaps
 from panorama_stitch.pipeline.rig_state import RigState
 
 CHANGES = 5000 if os.environ.get('LONG') else 1000
@@ -36,7 +37,7 @@ def pictures():
 def stitcher_of(pictures, settings):
     stitcher = RigState(settings.cameras)
     place(stitcher, settings)
-    stitcher.overlaps = stitcher.measure([pictures], settings, 'correlation')
+    stitcher.overlaps = measure_overlaps(stitcher, [pictures], settings, 'correlation')
     return stitcher
 
 
@@ -82,7 +83,9 @@ def test_random_legal_values_of_every_live_parameter(pictures, seed):
         try:
             place(stitcher, settings)
             if chance.random() < MEASURED:
-                stitcher.overlaps = stitcher.measure([pictures], settings, settings.method)
+                stitcher.overlaps = measure_overlaps(
+                    stitcher, [pictures], settings, settings.method
+                )
             draw(stitcher, settings, pictures)
             counts['drawn'] += 1
         except FisheyeError as error:
@@ -107,7 +110,7 @@ def test_a_hard_seam_of_round_pictures_keeps_their_rows():
     stitcher, settings = RigState(('left', 'right')), PanoramaSettings()
     for camera in stitcher.cameras:
         stitcher.place(camera, lens, settings.surface_of(lens))
-    stitcher.overlaps = stitcher.measure([pictures], settings, 'correlation')
+    stitcher.overlaps = measure_overlaps(stitcher, [pictures], settings, 'correlation')
     for blend in ('none', 'feather'):
         heights[blend] = len(draw(stitcher, replace(settings, blend=blend), pictures))
     assert heights['none'] >= 0.97 * heights['feather']

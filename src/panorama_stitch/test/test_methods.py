@@ -23,7 +23,7 @@ from fisheye_core.errors import OverlapError
 from fisheye_geometry.attitude import LEVEL, Attitude
 from fisheye_geometry.lens_surface import surface_for
 from fisheye_geometry.surface import SURFACES, Surface
-from fisheye_testing.data import data_folder
+from fisheye_testing.data import real_data
 from panorama_stitch.overlap.corrected_overlap import measure_corrected
 from panorama_stitch.overlap.methods import METHODS, CameraView, PairInput
 from panorama_stitch.overlap.overlap_result import with_offset
@@ -315,7 +315,7 @@ def test_the_paper_without_particles_puts_the_views_side_by_side(town):
 
 
 def true_offset_px(name, surfaces):
-    truth = json.loads((data_folder('rigs', name) / 'truth.json').read_text())
+    truth = json.loads((real_data('rigs', name) / 'truth.json').read_text())
     left, right = surfaces
     shift = left.center_x_px - right.center_x_px
     return left.focal_px * radians(truth['offset_deg']) + shift

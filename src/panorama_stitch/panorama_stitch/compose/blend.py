@@ -106,6 +106,19 @@ class Feather:
         cv2.blendLinear(left, right, left_weight[rows], right_weight[rows], dst=right)
 
 
+class Alone:
+    """Where one view is alone; the other is made to show the same there: they do not differ."""
+
+    def __init__(self, left_seen: np.ndarray, right_seen: np.ndarray):
+        self._left = (left_seen & ~right_seen).astype(np.uint8)
+        self._right = (right_seen & ~left_seen).astype(np.uint8)
+
+    def fill(self, left: np.ndarray, right: np.ndarray) -> None:
+        """Copy to each of two views what only the other one shows."""
+        cv2.copyTo(left, self._left, right)
+        cv2.copyTo(right, self._right, left)
+
+
 class Multiband:
     """Fades coarse detail over the whole width and fine detail over little of it.
 
@@ -125,8 +138,7 @@ class Multiband:
         """Prepare; parameters as of `Feather`."""
         height, width = left_seen.shape
         begin, end = fade or (0, width)
-        self._left_alone = (left_seen & ~right_seen).astype(np.uint8)
-        self._right_alone = (right_seen & ~left_seen).astype(np.uint8)
+        self._alone = Alone(left_seen, right_seen)
         left_half = np.tile(np.arange(width) < (begin + end) / 2, (height, 1))
         self._weights = [left_half.astype(np.float32)]
         for _ in range(max(1, int(log2(max(1, end - begin) / _COARSEST_COLUMNS)))):
@@ -146,9 +158,7 @@ class Multiband:
         if self._shape != right.shape:
             self._shape = right.shape
             self._levels = [_Level(weight, right.shape[2:]) for weight in self._weights]
-        # Where one is alone the views do not differ.
-        cv2.copyTo(left, self._left_alone, right)
-        cv2.copyTo(right, self._right_alone, left)
+        self._alone.fill(left, right)
         levels = self._levels
         cv2.subtract(left, right, dst=levels[0].band, dtype=cv2.CV_16S)
         for fine, coarse in pairwise(levels):

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from fisheye_core.parallel import run_parallel
-from panorama_stitch.compose.blend import Feather
+from panorama_stitch.compose.blend import Alone, Feather
 from panorama_stitch.compose.optical_flow import OpticalFlow
 
 _ROUNDS = 3
@@ -49,8 +49,7 @@ class Flow:
         height, width = shape = left_seen.shape
         fade = fade or (0, width)
         self._feather = Feather(left_seen, right_seen, fade)
-        self._left_alone = (left_seen & ~right_seen).astype(np.uint8)
-        self._right_alone = (right_seen & ~left_seen).astype(np.uint8)
+        self._alone = Alone(left_seen, right_seen)
         self._fade = slice(*fade)
         ramp = (np.arange(fade[1] - fade[0], dtype=np.float32) + 0.5) / max(1, fade[1] - fade[0])
         self._weights = [np.tile(weight, (height, 1)) for weight in (1 - ramp, ramp)]
@@ -86,9 +85,7 @@ class Flow:
             self._trust = np.zeros_like(self._area)
             self._feather(left, right)
             return
-        # Where one is alone the views do not differ.
-        cv2.copyTo(left, self._left_alone, right)
-        cv2.copyTo(right, self._right_alone, left)
+        self._alone.fill(left, right)
         self._flow.follow(left, right)
         strength = self._used
         np.copyto(strength, self._gate())

@@ -46,8 +46,7 @@ class GainCompensation:
             BrightnessRatio(layout, sum(seam) / 2, pair, channels)
             for seam, pair in zip(layout.seams, neighbours(placed), strict=True)
         ]
-        widths = [layout.surface.width] * len(group)
-        self._multipliers = [_Multiplier(width, channels) for width in widths]
+        self._multipliers = [_Multiplier(layout.surface.width, channels) for _ in group]
         self._age = 0
         for pair in self._pairs:
             pair.compare(group)

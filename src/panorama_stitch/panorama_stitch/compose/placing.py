@@ -9,6 +9,7 @@ import numpy as np
 
 from fisheye_core.errors import GeometryError
 from fisheye_core.parallel import run_parallel
+from fisheye_geometry.remap import on_picture
 from fisheye_geometry.rig import unwrapped
 from fisheye_geometry.surface import Surface
 from fisheye_geometry.surface_kind import KINDS
@@ -140,9 +141,7 @@ def _columns(view: View, grid: Surface, axis: float) -> tuple[int, int]:
 def _sees(view: View, grid: Surface, columns: np.ndarray, row: float) -> np.ndarray:
     """Whether a camera sees anything at pixels of one row."""
     rays = grid.rays(columns - view.shift_px[0], row - view.shift_px[1])
-    pixels, seen = view.source.project(rays @ view.attitude.matrix)
-    last = np.array([view.source.width, view.source.height]) - 0.5
-    return seen & np.all((pixels >= -0.5) & (pixels <= last), axis=-1)
+    return on_picture(view.source, rays @ view.attitude.matrix)[1]
 
 
 def _rows(view: View, grid: Surface) -> tuple[int, int]:

@@ -51,21 +51,9 @@ class View:
     seen: np.ndarray | None = None
     body: np.ndarray | None = None
 
-    @property
-    def is_corrected(self) -> bool:
-        """Whether the pictures are what `corrected` gives."""
-        return self.source == self.surface and self.attitude == LEVEL
-
-    def valid(self) -> np.ndarray:
-        """(surface height, surface width) bool: where the corrected picture shows anything."""
-        if self.is_corrected:
-            return self.seen_pixels
-        table = remap_table(self.source, self.surface, self.interpolation, self.attitude)
-        return table.valid if self.seen is None else shown(self.seen, table, table.valid.shape)
-
     def corrected(self, image: np.ndarray) -> np.ndarray:
         """Correct a whole picture; exactly 0 where nothing is seen and nowhere else."""
-        if self.is_corrected:
+        if self.source == self.surface and self.attitude == LEVEL:
             return image
         table = remap_table(self.source, self.surface, self.interpolation, self.attitude)
         corrected, valid = table(image), table.valid
@@ -82,12 +70,6 @@ class View:
         if place:
             return Copy(*place, surface.size, self.source)
         return RemapTable(self.source, surface, self.interpolation, self.attitude)
-
-    @property
-    def seen_pixels(self) -> np.ndarray:
-        """(source height, source width) bool: where the pictures show anything."""
-        everywhere = np.ones((self.source.height, self.source.width), bool)
-        return everywhere if self.seen is None else self.seen
 
     def field_rad(self) -> tuple[float, float, float, float]:
         """Return how far the wanted picture reaches to the left, right, up and down, rad.
@@ -120,11 +102,13 @@ class View:
         up, down = np.arctan2(rays[:, 1], rays[:, 2]) * (-1, 1)
         return float(sides[0]), float(sides[1]), float(up), float(down)
 
+    def shows(self, table: 'RemapTable | Copy') -> np.ndarray:
+        """(height, width) bool: where a table of this view shows anything."""
+        return table.valid if self.seen is None else shown(self.seen, table, table.valid.shape)
+
     def shows_scene(self, table: 'RemapTable | Copy') -> np.ndarray:
         """(height, width) bool: where a table of this view shows anything but the robot itself."""
-        valid = table.valid
-        if self.seen is not None:
-            valid = shown(self.seen, table, valid.shape)
+        valid = self.shows(table)
         if self.body is not None:
             valid = valid & shown(~self.body, table, valid.shape)
         return valid

@@ -19,11 +19,8 @@ from fisheye_geometry.camera import Camera
 from fisheye_geometry.image_circle import LensWithImageCircle
 from fisheye_geometry.lens import Lens
 from panorama_stitch.nodes.base_node import PanoramaBase
-from panorama_stitch.nodes.frame_reader import Reader, reader_for
+from panorama_stitch.nodes.frame_reader import TOPIC, Reader, reader_for
 from panorama_stitch.pipeline.panorama_settings import PanoramaSettings
-
-TOPIC = 'topic'
-"""The source that is no camera of this node: another one publishes the images."""
 
 
 class CameraInput:

@@ -16,6 +16,8 @@ from fisheye_core.errors import SettingError
 from fisheye_geometry.camera import Camera
 from panorama_stitch.nodes.base_node import PanoramaBase
 
+TOPIC = 'topic'
+"""The source that is no camera of this node: another one publishes the images."""
 _OF_SOURCE = 'rtsp_transport', 'stamp_from', 'delay_ms'
 """What cameras that share a source cannot have different."""
 
@@ -70,8 +72,6 @@ class SourceReader(Reader):
 
     def start(self) -> None:
         """Begin to read."""
-        if self._grabber.attempts:
-            self._tell(self._grabber.reason)
         self._grabber.start()
 
     def stop(self) -> None:
@@ -136,8 +136,9 @@ def reader_for(
     SourceError
         If the source can give no frame ever.
     """
+    is_topic = own.source == TOPIC
     topic = node.resolve_topic_name(f'{name}/image_raw')
-    key = topic if own.source == 'topic' else _key(name, own.source)
+    key = topic if is_topic else _key(name, own.source)
     if reader := readers.get(key):
         for entry in _OF_SOURCE:
             mine, theirs = getattr(own, entry), getattr(reader.settings, entry)
@@ -147,7 +148,6 @@ def reader_for(
                     'whose source is the same'
                 )
         return reader
-    is_topic = own.source == 'topic'
     readers[key] = TopicReader(node, topic, own) if is_topic else SourceReader(node, own)
     return readers[key]
 

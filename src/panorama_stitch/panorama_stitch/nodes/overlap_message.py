@@ -9,7 +9,7 @@ from std_msgs.msg import Header
 
 from fisheye_bridge.stamps import stamp_of
 from fisheye_geometry.attitude import LEVEL
-from fisheye_geometry.rig import pairs_of
+from fisheye_geometry.rig import pairs_for
 from fisheye_geometry.surface import Surface
 from panorama_stitch.overlap.overlap_result import Overlap as OverlapResult
 from panorama_stitch.overlap.overlap_result import yaw_between_rad
@@ -29,7 +29,7 @@ def overlap_messages(
             frame_id,
         )
         for result, (left, right) in zip(
-            results, pairs_of(len(cameras), len(results) == len(cameras) > 1), strict=True
+            results, pairs_for(len(cameras), len(results)), strict=True
         )
     ]
 
@@ -41,6 +41,7 @@ def _message(
     frame_id: str,
 ) -> Overlap:
     attitude = result.attitude or LEVEL
+    yaw_deg = degrees(yaw_between_rad(result.offset_x_px, *surfaces))
     return Overlap(
         header=Header(stamp=stamp_of(result.stamp_ns), frame_id=frame_id),
         left_camera=names[0],
@@ -49,8 +50,8 @@ def _message(
         found=result.found,
         offset_x_px=result.offset_x_px,
         offset_y_px=result.offset_y_px,
-        offset_deg=degrees(yaw_between_rad(result.offset_x_px, *surfaces)),
-        yaw_deg=degrees(yaw_between_rad(result.offset_x_px, *surfaces)),
+        offset_deg=yaw_deg,
+        yaw_deg=yaw_deg,
         pitch_deg=degrees(attitude.pitch_rad),
         roll_deg=degrees(attitude.roll_rad),
         near_deg=result.near_deg,

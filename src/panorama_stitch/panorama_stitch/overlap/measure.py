@@ -106,8 +106,7 @@ def measure_rotation(
         confidence=sure,
         covariance=fine.frame @ covariance @ fine.frame.T,
         near_deg=_near_deg(close),
-        far=fine.rays(fine.fit.far),
-        near=close.rays(close.fit.near),
+        votes=int(fine.fit.far.sum() + close.fit.near.sum()),
         evidence=evidence,
     )
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from fisheye_core.errors import FileContentError, OverlapFileError
 from fisheye_core.yaml_file import is_missing, is_number, read_mapping, shown, write_mapping
-from fisheye_geometry.rig import Pair, pairs_of
+from fisheye_geometry.rig import pairs_for
 from fisheye_geometry.surface import Surface
 from panorama_stitch.overlap.overlap_entry import overlap_entry, overlap_of
 from panorama_stitch.overlap.overlap_result import Overlap
@@ -14,8 +14,8 @@ from panorama_stitch.overlap.overlap_result import Overlap
 VERSION = 2
 _READABLE = (1, 2)
 """Version 1 knew offsets of level cameras and small tilts, no rotation."""
-_SIZE_KEYS = ('width', 'height')
-_LENGTH_KEYS = ('focal_px', 'center_x_px', 'center_y_px')
+SIZE_KEYS = ('width', 'height')
+LENGTH_KEYS = ('focal_px', 'center_x_px', 'center_y_px')
 _LENGTH_TOLERANCE_PX = 0.01
 """More than rounding, less than anybody sees."""
 
@@ -49,7 +49,9 @@ def write_overlaps(
             'cameras': [_camera(*camera) for camera in zip(cameras, surfaces, strict=True)],
             'overlaps': [
                 overlap_entry(cameras[left], cameras[right], overlap)
-                for (left, right), overlap in zip(_pairs(cameras, overlaps), overlaps, strict=True)
+                for (left, right), overlap in zip(
+                    pairs_for(len(cameras), len(overlaps)), overlaps, strict=True
+                )
             ],
         },
     )
@@ -72,37 +74,44 @@ def read_overlaps(
     if not path or is_missing(path):
         return None
     try:
-        entries = read_mapping(path)
-        version = entries.get('version')
-        if version not in _READABLE:
-            expected = ' or '.join(map(str, _READABLE))
-            raise OverlapFileError(f'version is {shown(version)}; expected {expected}')
-        _check_cameras(_list(entries, 'cameras'), cameras, surfaces)
-        measured = _list(entries, 'overlaps')
-        pairs = _pairs(cameras, measured)
-        if len(measured) != len(pairs):
-            raise OverlapFileError(
-                f'{len(measured)} overlaps for {len(cameras)} cameras; expected one for each '
-                'pair of neighbours'
-            )
-        return [
-            overlap_of(
-                version, (cameras[left], cameras[right]), (surfaces[left], surfaces[right]), entry
-            )
-            for (left, right), entry in zip(pairs, measured, strict=True)
-        ]
+        return overlaps_in(read_mapping(path), cameras, surfaces)
     except FileContentError as error:
         raise OverlapFileError(error.reason, path) from error
 
 
-def _pairs(cameras: Sequence[str], overlaps: Sequence) -> tuple[Pair, ...]:
-    """Return the pairs of neighbours that so many overlaps are for."""
-    return pairs_of(len(cameras), len(overlaps) == len(cameras) > 1)
+def overlaps_in(
+    entries: dict, cameras: Sequence[str], surfaces: Sequence[Surface]
+) -> list[Overlap]:
+    """Return the overlaps of what an overlap file holds, as `read_overlaps`.
+
+    Raises
+    ------
+    OverlapFileError
+        Likewise, but the sentence names no file.
+    """
+    version = entries.get('version')
+    if version not in _READABLE:
+        expected = ' or '.join(map(str, _READABLE))
+        raise OverlapFileError(f'version is {shown(version)}; expected {expected}')
+    _check_cameras(_list(entries, 'cameras'), cameras, surfaces)
+    measured = _list(entries, 'overlaps')
+    pairs = pairs_for(len(cameras), len(measured))
+    if len(measured) != len(pairs):
+        raise OverlapFileError(
+            f'{len(measured)} overlaps for {len(cameras)} cameras; expected one for each '
+            'pair of neighbours'
+        )
+    return [
+        overlap_of(
+            version, (cameras[left], cameras[right]), (surfaces[left], surfaces[right]), entry
+        )
+        for (left, right), entry in zip(pairs, measured, strict=True)
+    ]
 
 
 def _camera(name: str, surface: Surface) -> dict:
-    numbers = {key: float(getattr(surface, key)) for key in _LENGTH_KEYS}
-    sizes = {key: getattr(surface, key) for key in _SIZE_KEYS}
+    numbers = {key: float(getattr(surface, key)) for key in LENGTH_KEYS}
+    sizes = {key: getattr(surface, key) for key in SIZE_KEYS}
     return {'name': name, 'surface': surface.kind, **sizes, **numbers}
 
 
@@ -123,7 +132,7 @@ def _check_cameras(entries, cameras, surfaces) -> None:
         now = _camera(name, surface)
         for key, value in now.items():
             then = entry.get(key)
-            if key in _LENGTH_KEYS and is_number(then):
+            if key in LENGTH_KEYS and is_number(then):
                 if abs(then - value) <= _LENGTH_TOLERANCE_PX:
                     continue
                 value = round(value, 3)

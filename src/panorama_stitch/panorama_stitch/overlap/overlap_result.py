@@ -3,7 +3,9 @@
 from dataclasses import dataclass, replace
 from math import atan2, degrees, isnan, nan, radians, tan
 
-from fisheye_geometry.attitude import LEVEL, Attitude
+import numpy as np
+
+from fisheye_geometry.attitude import LEVEL, Attitude, rotation_matrix
 from fisheye_geometry.surface import Surface
 from panorama_stitch.overlap.particles import Particle
 
@@ -60,6 +62,23 @@ class Overlap:
     right_match: int = -1
     message: str = ''
     stamp_ns: int = 0
+
+
+def aligned_at(matrix: np.ndarray, distance_m: float, baseline_m: float) -> np.ndarray:
+    """Return the rotation (3, 3) with which both views agree at a distance instead of far away.
+
+    Lenses that are apart see near things turned towards each other: there the views agree where
+    the right one is turned by baseline / distance about the normal of both axes.
+
+    Parameters
+    ----------
+    matrix
+        (3, 3), right rays to left ones, with which they agree far away.
+    distance_m, baseline_m
+        Where they shall agree, and how far the lenses are apart.
+    """
+    axis = np.cross((0.0, 0.0, 1.0), matrix[:, 2])
+    return rotation_matrix(axis / np.linalg.norm(axis) * (baseline_m / distance_m)) @ matrix
 
 
 def yaw_between_rad(offset_x_px: float, left: Surface, right: Surface) -> float:

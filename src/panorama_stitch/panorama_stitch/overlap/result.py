@@ -1,6 +1,6 @@
 """What measuring a rotation gives, and what limits it, in a word and a sentence."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -21,10 +21,6 @@ _MOSTLY = 0.5
 _SLIGHT_LEAD = 0.3
 
 
-def _no_rays() -> np.ndarray:
-    return np.zeros((0, 2, 3))
-
-
 @dataclass(frozen=True, eq=False)
 class RotationResult:
     """How the right camera is turned against the left one, and how sure that is.
@@ -42,8 +38,8 @@ class RotationResult:
         (3, 3) rad^2, of a small rotation in the left optical frame.
     near_deg
         How far near things lie beside far ones in the two views; 0 where none is.
-    far, near
-        (n, 2, 3) pairs of rays, left and right, at which far and near things are seen.
+    votes
+        Number of patches that far and near things were seen in.
     evidence
         What the confidence is made of; None where nothing was seen.
     """
@@ -53,14 +49,8 @@ class RotationResult:
     confidence: float = 0.0
     covariance: np.ndarray | None = None
     near_deg: float = 0.0
-    far: np.ndarray = field(default_factory=_no_rays)
-    near: np.ndarray = field(default_factory=_no_rays)
+    votes: int = 0
     evidence: Evidence | None = None
-
-    @property
-    def votes(self) -> int:
-        """Number of patches that far and near things were seen in."""
-        return len(self.far) + len(self.near)
 
     @property
     def limit(self) -> str:
@@ -89,13 +79,3 @@ class RotationResult:
     def nearest_m(self, baseline_m: float) -> float:
         """Distance of the nearest things of the overlap for lenses that far apart."""
         return baseline_m / np.radians(self.near_deg) if self.near_deg else np.inf
-
-    def aligned_at(self, distance_m: float, baseline_m: float) -> Rotation | None:
-        """Return the rotation that makes both views agree at a distance instead of far away."""
-        if self.rotation is None:
-            return None
-        there = self.rotation.apply([0.0, 0.0, 1.0])
-        axis = np.cross([0.0, 0.0, 1.0], there)
-        # A near thing lies further to the right in the left view: the right view follows it.
-        axis *= baseline_m / distance_m / np.linalg.norm(axis)
-        return Rotation.from_rotvec(axis) * self.rotation

@@ -9,9 +9,9 @@ from fisheye_core.yaml_file import is_missing, read_mapping, shown
 from fisheye_geometry.rig import Rig
 from fisheye_geometry.rig_solution import solve_rig
 from fisheye_geometry.surface import Surface
-from panorama_stitch.overlap.overlap_file import read_overlaps
+from panorama_stitch.overlap.overlap_file import LENGTH_KEYS, SIZE_KEYS, overlaps_in
 
-_KEYS = 'width', 'height', 'focal_px', 'center_x_px', 'center_y_px'
+_KEYS = *SIZE_KEYS, *LENGTH_KEYS
 
 
 def saved_rig(path: str | Path, cameras: Sequence[str]) -> Rig | None:
@@ -40,8 +40,9 @@ def saved_rig(path: str | Path, cameras: Sequence[str]) -> Rig | None:
     if is_missing(path):
         return None
     try:
-        surfaces = _surfaces(read_mapping(path).get('cameras'))
-        overlaps = read_overlaps(path, cameras, surfaces)
+        entries = read_mapping(path)
+        surfaces = _surfaces(entries.get('cameras'))
+        overlaps = overlaps_in(entries, cameras, surfaces)
         rotations = [None if o.attitude is None else o.attitude.matrix for o in overlaps]
         between = len(cameras) - 1
         return solve_rig(

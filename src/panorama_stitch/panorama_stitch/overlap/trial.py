@@ -105,12 +105,6 @@ class Trial:
         chance = _CHANCE * self.votes.textured
         return (self.far - chance) / np.sqrt(chance * self.patch_area + 1)
 
-    def rays(self, chosen: np.ndarray) -> np.ndarray:
-        """Pairs of rays (n, 2, 3) of chosen votes in the optical frames of the cameras."""
-        left = self.votes.left[chosen] @ self.frame.T
-        right = self.votes.right[chosen] @ self.frame.T
-        return np.stack([left, right @ self.rotation], axis=1)
-
 
 def try_rotation(
     pairs: Sequence[tuple[OverlapView, OverlapView]], usable, rotation: np.ndarray, reach: Reach

@@ -93,9 +93,19 @@ class OverlapView:
         """
         pixels, seen = self.model.project(rays)
         pixels = np.where(seen[..., None], pixels, -9.0).astype(np.float32)
-        grey = self.grey
-        if smooth_px > 0.5:
-            grey = cv2.GaussianBlur(grey, (0, 0), smooth_px)
-        image = cv2.remap(grey, pixels, None, cv2.INTER_LINEAR)
+        image = cv2.remap(self._blurred(smooth_px), pixels, None, cv2.INTER_LINEAR)
         usable = self.usable if usable is None else usable
         return image, cv2.remap(usable, pixels, None, cv2.INTER_NEAREST) > 0
+
+    def _blurred(self, smooth_px: float) -> np.ndarray:
+        """The grey image, blurred; the last one is kept for the next proposal."""
+        if smooth_px <= 0.5:
+            return self.grey
+        if smooth_px not in self._last_blurred:
+            self._last_blurred.clear()
+            self._last_blurred[smooth_px] = cv2.GaussianBlur(self.grey, (0, 0), smooth_px)
+        return self._last_blurred[smooth_px]
+
+    @cached_property
+    def _last_blurred(self) -> dict[float, np.ndarray]:
+        return {}

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from fisheye_geometry.camera_file import read_camera
-from fisheye_testing.data import data_folder
+from fisheye_testing.data import real_data
 from panorama_stitch.overlap.measure import measure_rotation
 from panorama_stitch.overlap.view import OverlapView
 
@@ -50,7 +50,7 @@ def view(path, camera):
 
 @pytest.mark.parametrize('name', FIELD)
 def test_every_neighbouring_pair_of_a_rig_is_right(name):
-    path = data_folder('field', name)
+    path = real_data('field', name)
     truth = json.loads((path / 'truth.json').read_text())
     cameras, attitudes = truth['cameras'], truth['attitude']
     neighbours = list(pairwise(cameras))
@@ -68,6 +68,6 @@ def test_every_neighbouring_pair_of_a_rig_is_right(name):
 
 @pytest.mark.parametrize('name', APART)
 def test_views_without_a_common_scene_are_not_believed(name):
-    path = data_folder('rigs', name)
+    path = real_data('rigs', name)
     result = measure_rotation([(view(path, 'left'), view(path, 'right'))])
     assert result is None or result.confidence < DOUBTFUL

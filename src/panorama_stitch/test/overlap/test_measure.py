@@ -9,6 +9,7 @@ from seeing import LENS, apart_deg, see, turned, world
 from fisheye_geometry.lens_surface import surface_for
 from fisheye_geometry.remap import RemapTable
 from panorama_stitch.overlap.measure import measure_rotation
+from panorama_stitch.overlap.overlap_result import aligned_at
 from panorama_stitch.overlap.view import OverlapView
 
 RIGHT_DEG = 0.5
@@ -58,11 +59,11 @@ def test_a_near_post_does_not_move_the_far_scene():
 def test_aligned_at_a_distance_brings_the_post_together():
     left, right = turned(yaw=-YAW / 2), turned(yaw=YAW / 2)
     far = measure_rotation([pair(left, right)])
-    near = far.aligned_at(distance_m=2.0, baseline_m=0.1)
+    near = aligned_at(far.rotation.as_matrix(), distance_m=2.0, baseline_m=0.1)
     # A thing 2 m ahead of the middle of the rig, as either camera sees it.
     seen = [attitude.inv().apply([-x, 0.0, 2.0]) for attitude, x in ((left, -0.05), (right, 0.05))]
     seen = [ray / np.linalg.norm(ray) for ray in seen]
-    assert np.degrees(np.linalg.norm(near.apply(seen[1]) - seen[0])) < SHARP_DEG
+    assert np.degrees(np.linalg.norm(near @ seen[1] - seen[0])) < SHARP_DEG
     assert np.degrees(np.linalg.norm(far.rotation.apply(seen[1]) - seen[0])) > 2.0
 
 
