@@ -8,7 +8,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
-from fisheye_bridge.hearing import TOPIC, Hearing
+from fisheye_bridge.hearing import TOPIC, hearing_of
 from fisheye_bridge.qos import HEARTBEAT
 from fisheye_core.errors import FisheyeError
 
@@ -93,7 +93,7 @@ class Diagnostics:
         self._node = node
         self._fill = fill
         self._publisher = node.create_publisher(DiagnosticArray, TOPIC, HEARTBEAT)
-        self._hearing = Hearing(node)
+        self._hearing = hearing_of(node)
         # A node is heard while a recording, and with it the time of ROS, stands still.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._timer = node.create_timer(1.0, self._publish, clock=steady)

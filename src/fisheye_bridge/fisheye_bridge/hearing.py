@@ -32,15 +32,18 @@ class Hearing:
         self._name = node.get_fully_qualified_name()
         self._since_s: dict[bytes, float] = {}
         self._heard_s: dict[str, float] = {}
-        self._due_s = 0.0
+        self._due_s, self._silence = 0.0, ''
         node.create_subscription(DiagnosticArray, TOPIC, self._take, _DEPTH)
 
     def silence(self) -> str:
         """Return who can be seen, for some seconds, and was not heard; '' if all is well."""
         now_s = self._now_s()
-        if now_s < self._due_s:
-            return ''
-        self._due_s = now_s + _LOOK_S
+        if now_s >= self._due_s:
+            self._due_s = now_s + _LOOK_S
+            self._silence = self._looked(now_s)
+        return self._silence
+
+    def _looked(self, now_s: float) -> str:
         others = {bytes(end.endpoint_gid): _name(end) for end in self._others()}
         self._since_s = {gid: self._since_s.get(gid, now_s) for gid in others}
         silent = {
@@ -68,6 +71,11 @@ class Hearing:
     def _take(self, message: DiagnosticArray) -> None:
         names = {status.hardware_id for status in message.status} - {self._name}
         self._heard_s.update(dict.fromkeys(names, self._now_s()))
+
+
+def hearing_of(node: Node) -> Hearing:
+    """Return what listens for a node: one for all who ask."""
+    return vars(node).get('_hearing') or vars(node).setdefault('_hearing', Hearing(node))
 
 
 def _name(end) -> str:

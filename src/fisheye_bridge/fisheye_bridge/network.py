@@ -18,6 +18,8 @@ from time import monotonic
 
 from rclpy.node import Node
 
+from fisheye_bridge.shared_memory import is_fast_dds
+
 _LOOK_S = 0.2
 _GET_FLAGS, _GET_ADDRESS = 0x8913, 0x8915
 """ioctls of netdevice(7)."""
@@ -100,14 +102,14 @@ def refresher(node: Node) -> Callable[[], bool]:
     A participant whose QoS is set again looks (`DomainParticipant::set_qos` of Fast DDS 2.x). That
     is no part of rcl; where another middleware or version runs, it returns False.
     """
+    if not is_fast_dds():
+        return lambda: False
     try:
         handle_of = _function('librcl.so', 'rcl_node_get_rmw_handle', 1)
         participant_of = _function('librmw_fastrtps_cpp.so', _PARTICIPANT, 1)
         qos_of = _function('librmw_fastrtps_cpp.so', _GET_QOS, 1)
         set_qos = _function('librmw_fastrtps_cpp.so', _SET_QOS, 2)
     except (OSError, AttributeError):
-        return lambda: False
-    if os.environ.get('RMW_IMPLEMENTATION', 'rmw_fastrtps_cpp') != 'rmw_fastrtps_cpp':
         return lambda: False
 
     def refresh() -> bool:

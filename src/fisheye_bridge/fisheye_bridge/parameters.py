@@ -1,6 +1,6 @@
 """ROS parameters declared from a settings dataclass, checked and kept up to date."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import replace
 from difflib import get_close_matches
@@ -92,21 +92,22 @@ class Parameters:
         SettingError
             If the value is not possible.
         """
-        name = parameter.name.removeprefix(self._prefix)
-        if parameter.name != self._prefix + name or name not in self._rules:
-            return None
-        kind, _, rule = self._rules[name]
-        return _typed(parameter.name, convert(parameter.name, parameter.value, kind, rule))
+        values = self._changes([parameter]).values()
+        return next((_typed(parameter.name, value) for value in values), None)
+
+    def _changes(self, parameters: Iterable[Parameter]) -> dict[str, Any]:
+        """Return the values that parameters give to these settings, checked."""
+        changes = {}
+        for parameter in parameters:
+            name = parameter.name.removeprefix(self._prefix)
+            if parameter.name == self._prefix + name and name in self._rules:
+                kind, _, rule = self._rules[name]
+                changes[name] = convert(parameter.name, parameter.value, kind, rule)
+        return changes
 
     def _set(self, parameters) -> SetParametersResult:
-        changes = {}
         try:
-            for parameter in parameters:
-                name = parameter.name.removeprefix(self._prefix)
-                if parameter.name == self._prefix + name and name in self._rules:
-                    kind, _, rule = self._rules[name]
-                    changes[name] = convert(parameter.name, parameter.value, kind, rule)
-            changed = replace(self.settings, **changes)
+            changed = replace(self.settings, **self._changes(parameters))
             # NaN differs from itself, but not in print.
             if repr(changed) != repr(self.settings):
                 if self._on_change:

@@ -20,7 +20,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from fisheye_bridge import shared_memory
 from fisheye_bridge.command_line import refuse_words, usage
-from fisheye_bridge.hearing import Hearing
+from fisheye_bridge.hearing import hearing_of
 from fisheye_bridge.network import Links, forget_machine, refresher
 from fisheye_bridge.parameters import misspelt
 from fisheye_core.errors import FisheyeError
@@ -102,7 +102,7 @@ class _Process:
             self._node = node = self._built()
             executor = SingleThreadedExecutor()
             executor.add_node(node)
-            refresh, hearing = refresher(node), Hearing(node)
+            refresh, hearing = refresher(node), hearing_of(node)
             while not self._ended.is_set():
                 executor.spin_once(timeout_sec=_LONGEST_WAIT_S)
                 if self._parent not in (None, os.getppid()):

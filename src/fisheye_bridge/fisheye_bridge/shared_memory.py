@@ -35,7 +35,7 @@ def prepare(folder: Path = FOLDER) -> str:
     str
         What is not as it should be; '' if nothing.
     """
-    if os.environ.get('RMW_IMPLEMENTATION', 'rmw_fastrtps_cpp') != 'rmw_fastrtps_cpp':
+    if not is_fast_dds():
         return ''
     _clear(folder)
     own = Path(get_package_share_directory('fisheye_bridge'), 'config', _PROFILE)
@@ -50,6 +50,11 @@ def prepare(folder: Path = FOLDER) -> str:
         os.environ[_VARIABLE] = str(small)
         return f'{has}: pictures of more than 2 million pixels may be lost ({_REMEDY})'
     return f'{has}: pictures go over UDP, and some may be lost ({_REMEDY})'
+
+
+def is_fast_dds() -> bool:
+    """Whether the environment leaves the middleware at Fast DDS."""
+    return os.environ.get('RMW_IMPLEMENTATION', 'rmw_fastrtps_cpp') == 'rmw_fastrtps_cpp'
 
 
 def own_ports() -> list[str]:

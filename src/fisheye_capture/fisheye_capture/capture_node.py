@@ -47,8 +47,6 @@ class CaptureNode(Node):
         self._camera = self._calibration()
         self.create_service(SetCameraInfo, 'set_camera_info', self._set_camera_info)
         self._diagnostics = Diagnostics(self, self._report)
-        if self._grabber.attempts:
-            self._tell(self._grabber.reason)
         self._grabber.start()
 
     def destroy_node(self) -> None:

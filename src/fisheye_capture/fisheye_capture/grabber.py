@@ -112,7 +112,9 @@ class Grabber:
         )
 
     def start(self) -> None:
-        """Begin to read."""
+        """Begin to read; tell first why the source could not be opened, if so."""
+        if self.attempts:
+            self._on_change(self.reason)
         self._thread.start()
 
     def stop(self) -> None:

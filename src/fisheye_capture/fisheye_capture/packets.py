@@ -4,7 +4,6 @@ import time
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import count
 
 import av
 import av.logging
@@ -88,13 +87,9 @@ class PacketReader:
             )
         # What FFmpeg gave then, it gave because this one began to come.
         self._arrivals_ns.append(arrival_ns)
-        return self._clock.stamp_ns(self._media_ns(packet), self._arrivals_ns[0])
-
-    def _media_ns(self, packet):
-        time_ticks = packet.pts if packet.dts is None else packet.dts
-        if time_ticks is None or self._format not in ('rtsp', 'mpegts'):
-            return None  # Elsewhere FFmpeg invents the times.
-        return int(time_ticks * packet.time_base * _NS_PER_S)
+        # Of other containers FFmpeg invents the times.
+        media_ns = _media_ns(packet) if self._format in ('rtsp', 'mpegts') else None
+        return self._clock.stamp_ns(media_ns, self._arrivals_ns[0])
 
 
 class PlaylistReader(PacketReader):
@@ -105,9 +100,7 @@ class PlaylistReader(PacketReader):
         start_ns = None
         for arrival in super().read():
             packet = arrival.packet
-            ticks = packet.pts if packet.dts is None else packet.dts
-            now_ns = time.time_ns()
-            media_ns = 0 if ticks is None else int(ticks * packet.time_base * _NS_PER_S)
+            media_ns, now_ns = _media_ns(packet) or 0, time.time_ns()
             if start_ns is None or abs(start_ns + media_ns - now_ns) > _MAX_DIFFERENCE_NS:
                 start_ns = now_ns - media_ns
             time.sleep(max(0, start_ns + media_ns - now_ns) / _NS_PER_S)
@@ -127,7 +120,7 @@ class SnapshotReader:
         period_s = 1 / self._request.frame_rate_hz
         self._first.close()
         due_s = time.monotonic()
-        for _ in count():
+        while True:
             due_s = max(due_s + period_s, time.monotonic())
             with open_camera(self._request).container as container:
                 for packet in container.demux(container.streams.video[0]):
@@ -149,3 +142,9 @@ def _camera_ns(packet):
     if not hasattr(packet, 'has_sidedata') or not packet.has_sidedata('prft'):
         return None
     return int.from_bytes(bytes(packet.get_sidedata('prft'))[:8], 'little') * 1000
+
+
+def _media_ns(packet) -> int | None:
+    """Return the time of a packet in its stream, ns; None if it has none."""
+    ticks = packet.pts if packet.dts is None else packet.dts
+    return None if ticks is None else int(ticks * packet.time_base * _NS_PER_S)

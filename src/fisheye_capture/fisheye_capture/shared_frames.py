@@ -61,10 +61,6 @@ class SlotPool:
         self._count += 1
         return self._count - 1
 
-    def put_back(self, number: int) -> None:
-        """Free a slot that was not used."""
-        self._free.append(number)
-
     def array(self, number: int, size: int, files: list[int]) -> np.ndarray:
         """Return what is in a slot, (size,) uint8; the slot is free when the array is gone."""
         for file in files:

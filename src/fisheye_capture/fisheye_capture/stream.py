@@ -7,17 +7,26 @@ a process can be ended at any moment and harms nobody if it fails.
 import importlib.util
 import math
 import os
+import re
 import socket
 import subprocess
 import sys
 from contextlib import suppress
 from dataclasses import asdict
+from urllib.parse import quote
 
 from fisheye_capture.capture_settings import CaptureSettings
 from fisheye_capture.device import BROKEN_IN_A_ROW, check_size, jpeg_frame
 from fisheye_capture.network_request import StreamRequest
 from fisheye_capture.shared_frames import SlotPool, receive, send
-from fisheye_capture.source import Frame, JpegFrame, Source, SourceLostError, shown_source
+from fisheye_capture.source import (
+    CREDENTIALS,
+    Frame,
+    JpegFrame,
+    Source,
+    SourceLostError,
+    shown_source,
+)
 from fisheye_core.errors import ImageFormatError, SourceError
 
 _NS_PER_MS = 1_000_000
@@ -50,7 +59,7 @@ class StreamSource(Source):
             self._channel.close()
             raise SourceLostError(f'no process can read the stream: {error.strerror}') from error
         # Not as arguments: they are for everybody to see, and a URL may hold a password.
-        send(self._channel, asdict(StreamRequest.of(settings)))
+        send(self._channel, asdict(_request(settings)))
 
     def read(self) -> Frame | JpegFrame:
         """Wait for a picture that came after the one before; the newest if there are more."""
@@ -109,3 +118,28 @@ class StreamSource(Source):
         except ImageFormatError:
             self._torn += 1
             return None
+
+
+def _request(settings: CaptureSettings) -> StreamRequest:
+    """Return what to ask for a camera of these settings."""
+    return StreamRequest(
+        url=_quoted(settings.source),
+        shown=shown_source(settings.source),
+        encoding=settings.encoding,
+        frame_rate_hz=settings.frame_rate_hz,
+        rtsp_transport=settings.rtsp_transport,
+        connect_timeout_s=settings.connect_timeout_s,
+        silence_timeout_s=settings.silence_timeout_s,
+        first_picture_timeout_s=settings.first_picture_timeout_s,
+        stamp_from=settings.stamp_from,
+    )
+
+
+def _quoted(url):
+    """Write a user and password so that no letter in them means something in a URL."""
+
+    def quote_both(match):
+        user, mark, password = match['login'].partition(':')
+        return match['scheme'] + quote(user, safe='%') + mark + quote(password, safe='%') + '@'
+
+    return re.sub(CREDENTIALS, quote_both, url, count=1)

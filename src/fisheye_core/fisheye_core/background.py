@@ -19,37 +19,28 @@ class Background:
 
     def do(self, job: Callable[..., Any], *arguments: Any) -> Future:
         """Queue a job; its result, or its `FisheyeError`, is in the future."""
-        result: Future = Future()
-        self._thread.submit(job, *arguments).add_done_callback(
-            lambda done: self._hand_on(done, result)
-        )
-        return result
+        return self._thread.submit(self._run, job, *arguments)
 
     def stop(self) -> None:
         """Forget queued jobs and wait for the one that runs."""
         self._thread.shutdown(cancel_futures=True)
 
-    def _hand_on(self, done: Future, result: Future) -> None:
-        if done.cancelled():
-            result.cancel()
-            result.set_running_or_notify_cancel()
-            return
-        error = done.exception()
-        if error is None:
-            result.set_result(done.result())
-            return
-        if not isinstance(error, FisheyeError):
-            error = _bug(error)
-        self._on_error(error)
-        result.set_exception(error)
+    def _run(self, job: Callable[..., Any], *arguments: Any) -> Any:
+        try:
+            return job(*arguments)
+        except FisheyeError as error:
+            self._on_error(error)
+            raise
+        except BaseException as error:
+            bug = _bug(error)
+            self._on_error(bug)
+            raise bug from error
 
 
 def _bug(error: BaseException) -> BugError:
     """Return a sentence about what no code expected: only this job is left undone."""
     place = extract_tb(error.__traceback__)[-1]
-    bug = BugError(
+    return BugError(
         f'a bug, {type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno}, '
         f'{place.name}); please report it'
     )
-    bug.__cause__ = error
-    return bug

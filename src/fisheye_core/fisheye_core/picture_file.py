@@ -1,7 +1,6 @@
 """Picture files: which there are in a folder or a glob, and their pixels."""
 
 import os
-import stat
 from collections.abc import Collection
 from glob import escape, glob
 from pathlib import Path
@@ -10,6 +9,7 @@ import numpy as np
 
 from fisheye_core.coded_picture import pixels_of
 from fisheye_core.errors import ImageFormatError, SourceError
+from fisheye_core.regular_file import NotRegularError, opened_regular
 
 SUFFIXES = frozenset(
     {'.bmp', '.jp2', '.jpeg', '.jpg', '.pbm', '.pgm', '.png', '.ppm', '.tif', '.tiff', '.webp'}
@@ -74,6 +74,8 @@ def read_picture(path: str | Path, *, grey: bool = False) -> np.ndarray:
     """
     try:
         return pixels_of(np.frombuffer(_content(path), np.uint8), grey=grey)
+    except NotRegularError as error:
+        raise SourceError(f'{path} is not a regular file; expected a picture') from error
     except OSError as error:
         raise SourceError(f'{path} cannot be read: {error.strerror}') from error
     except ImageFormatError as error:
@@ -82,15 +84,11 @@ def read_picture(path: str | Path, *, grey: bool = False) -> np.ndarray:
 
 def _content(path: str | Path) -> bytes:
     """Read a regular file of a size that a picture can have; a FIFO or device never ends."""
-    # Without O_NONBLOCK, opening a FIFO waits for somebody who writes.
-    file = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
-    with os.fdopen(file, 'rb') as opened:
-        status = os.fstat(file)
-        if not stat.S_ISREG(status.st_mode):
-            raise SourceError(f'{path} is not a regular file; expected a picture')
-        if status.st_size > _MAX_BYTES:
+    with opened_regular(path) as file:
+        size = os.fstat(file.fileno()).st_size
+        if size > _MAX_BYTES:
             raise SourceError(
-                f'{path} has {status.st_size / 1e6:.0f} MB; expected a picture of up to '
+                f'{path} has {size / 1e6:.0f} MB; expected a picture of up to '
                 f'{_MAX_BYTES / 1e6:.0f} MB'
             )
-        return opened.read(_MAX_BYTES)
+        return file.read(_MAX_BYTES)

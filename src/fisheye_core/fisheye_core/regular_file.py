@@ -3,11 +3,12 @@
 import os
 import stat
 import tempfile
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from fcntl import LOCK_EX, LOCK_NB, flock
 from glob import escape
 from pathlib import Path
-from typing import TextIO
+from typing import BinaryIO, TextIO
 
 _KINDS = (
     (stat.S_ISDIR, 'a folder'),
@@ -28,6 +29,29 @@ def is_missing(path: str | Path) -> bool:
     return False
 
 
+class NotRegularError(OSError):
+    """There is something else than a regular file."""
+
+
+@contextmanager
+def opened_regular(path: str | Path) -> Iterator[BinaryIO]:
+    """Open a regular file, or what a link to one leads to, for reading; errors as of `open`.
+
+    Raises
+    ------
+    NotRegularError
+        If it is something else.
+    """
+    # Opening a FIFO would otherwise wait for somebody who writes.
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    try:
+        _check_regular(os.fstat(descriptor).st_mode)
+        with open(descriptor, 'rb', closefd=False) as file:
+            yield file
+    finally:
+        os.close(descriptor)
+
+
 def read_regular(path: str | Path, max_bytes: int) -> bytes:
     """Read a regular file, or what a link to one leads to.
 
@@ -43,14 +67,8 @@ def read_regular(path: str | Path, max_bytes: int) -> bytes:
     OSError
         If it cannot be read or is not a regular file; its `strerror` says why.
     """
-    # Opening a FIFO would otherwise wait for somebody who writes.
-    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
-    try:
-        _check_regular(os.fstat(descriptor).st_mode)
-        with open(descriptor, 'rb', closefd=False) as file:
-            return file.read(max_bytes + 1)
-    finally:
-        os.close(descriptor)
+    with opened_regular(path) as file:
+        return file.read(max_bytes + 1)
 
 
 def replace_regular(path: str | Path, text: str) -> None:
@@ -104,4 +122,4 @@ def _clear_abandoned(path: Path) -> None:
 def _check_regular(mode: int) -> None:
     if not stat.S_ISREG(mode):
         kind = next((name for is_kind, name in _KINDS if is_kind(mode)), 'something else')
-        raise OSError(0, f'it is {kind}; expected a regular file')
+        raise NotRegularError(0, f'it is {kind}; expected a regular file')
