@@ -46,7 +46,7 @@ class Result:
 
 
 def main() -> int:
-    """Print the table, write out/overlap.json and the curve; 1 where a target is missed."""
+    """Print the table, write out/overlap.jsonl and the curve; 1 where a target is missed."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('--out', type=Path, default=Path('out'), help='where results go')
     parser.add_argument('--quick', action='store_true', help='a tenth of the random rigs')

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from pairs import DATA
 from rigs import random_rig
 from scipy.spatial.transform import Rotation
 
 from fisheye_geometry.camera_file import read_camera
+from fisheye_testing.data import DATA
 from panorama_stitch.overlap.view import OverlapView
 
 WIDE_DEG, FAR_SHARE = 15.0, 1 / 3

@@ -1,7 +1,6 @@
 """Pairs of pictures whose cameras are known: of the synthetic rig, and of rigs in folders."""
 
 import json
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import radians
@@ -16,13 +15,14 @@ from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.camera_file import read_camera
 from fisheye_geometry.image_circle import ImageCircle
 from fisheye_geometry.lens import Lens
+from fisheye_testing.data import DATA
 from panorama_stitch.overlap.overlap_result import Overlap
 from panorama_stitch.pipeline.panorama_settings import PanoramaSettings
+from panorama_stitch.pipeline.rig_measurement import measure_overlaps
 from panorama_stitch.pipeline.rig_state import RigState
 
 SIDES = ('left', 'right')
 YAWS = radians(-70), radians(70)
-DATA = Path(os.environ.get('FISHEYE_DATA', ''))
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,9 @@ class ImagePair:
             attitude = Attitude(yaw_rad=YAWS[1] - YAWS[0])
             stitcher.overlaps = [Overlap('true', True, offset_px, 0.0, attitude)]
         else:
-            stitcher.overlaps = stitcher.measure([self.images], settings, settings.method)
+            stitcher.overlaps = measure_overlaps(
+                stitcher, [self.images], settings, settings.method
+            )
         return stitcher
 
 
@@ -60,15 +62,19 @@ def synthetic_pair(width: int, height: int, gains: Sequence[float] = (1.0, 1.0))
 
 def folder_pair(folder: Path) -> ImagePair:
     """Read left and right .png and .yaml."""
-    lenses, images = [], []
-    for side in SIDES:
-        image = cv2.imread(str(folder / f'{side}.png'))
-        lens = read_camera(folder / f'{side}.yaml').lens
-        circle = ImageCircle(lens)
-        circle.look(image)
-        lenses.append(lens.with_max_angle(circle.angle_rad))
-        images.append(image)
+    lenses, images = zip(*(read_view(folder, side) for side in SIDES), strict=True)
     return ImagePair(folder.name, lenses, images)
+
+
+def read_view(folder: Path, name: str) -> tuple[Lens, np.ndarray]:
+    """Read the lens of a camera, as far as its picture is lit, and the picture."""
+    image, lens = (
+        cv2.imread(str(folder / f'{name}.png')),
+        read_camera(folder / f'{name}.yaml').lens,
+    )
+    circle = ImageCircle(lens)
+    circle.look(image)
+    return lens.with_max_angle(circle.angle_rad), image
 
 
 def real_pairs() -> list[ImagePair]:

@@ -18,18 +18,17 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from pairs import DATA
+from pairs import read_view
 from scipy.spatial.transform import Rotation
 
 from fisheye_core.errors import FisheyeError
 from fisheye_geometry.attitude import angle_between
-from fisheye_geometry.camera_file import read_camera
-from fisheye_geometry.image_circle import ImageCircle
 from fisheye_geometry.lens_surface import surface_for
 from fisheye_geometry.level import DOWN
 from fisheye_geometry.rig import Rig, pairs_of
 from fisheye_geometry.rig_solution import solve_rig
 from fisheye_geometry.surface import SURFACES
+from fisheye_testing.data import DATA
 from panorama_stitch.compose.build import Style, build_compositor
 from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.compose.layout import covered
@@ -120,13 +119,8 @@ def main() -> int:
 def read_rig(folder: Path) -> FieldRig:
     """Read pictures, calibrations and truth."""
     truth = json.loads((folder / 'truth.json').read_text())
-    images = [cv2.imread(str(folder / f'{name}.png')) for name in truth['cameras']]
-    lenses = []
-    for name, image in zip(truth['cameras'], images, strict=True):
-        lens = read_camera(folder / f'{name}.yaml').lens
-        circle = ImageCircle(lens)
-        circle.look(image)
-        lenses.append(lens.with_max_angle(circle.angle_rad))
+    views = [read_view(folder, name) for name in truth['cameras']]
+    lenses, images = (list(each) for each in zip(*views, strict=True))
     attitudes = [np.reshape(truth['attitude'][name], (3, 3)) for name in truth['cameras']]
     return FieldRig(folder.name, images, lenses, attitudes, truth['closed'])
 
@@ -154,8 +148,7 @@ def measured(left: OverlapView, right: OverlapView, expected: Rotation | None = 
     """Return the rotation between two cameras, (3, 3), or None."""
     within_rad = np.pi if expected is None else np.radians(WAY_BACK_DEG)
     result = measure_rotation([(left, right)], expected=expected, within_rad=within_rad)
-    is_found = result is not None and result.confidence >= MIN_CONFIDENCE
-    return result.rotation.as_matrix() if is_found else None
+    return result.rotation.as_matrix() if result.found else None
 
 
 def named(rig: FieldRig) -> list:

@@ -25,7 +25,7 @@ images = [read_picture(folder / f'{side}.png') for side in sides]
 lenses = [read_camera(folder / f'{side}.yaml').lens for side in sides]
 
 found = measure_rotation([tuple(map(OverlapView, images, lenses))])
-if found is None or found.confidence < 0.5:
+if not found.found:
     sys.exit('The pictures have too little in common.')
 rig = solve_rig([*zip(sides, lenses, strict=True)], [found.rotation.as_matrix()]).rig
 

@@ -6,7 +6,7 @@ import hypothesis
 import pytest
 from field import Field
 
-from fisheye_testing.data import data_folder
+from fisheye_testing.data import real_data
 from fisheye_testing.rig import RigProcesses, unused_domain
 from fisheye_testing.watcher import Watcher
 
@@ -15,7 +15,7 @@ from fisheye_testing.watcher import Watcher
 def real_rig():
     """Return the folder of a rig of real pictures by its name."""
 
-    return lambda name: data_folder('rigs', name)
+    return lambda name: real_data('rigs', name)
 
 
 @pytest.fixture

@@ -4,8 +4,9 @@ import json
 import math
 
 import pytest
+from known_rigs import folder_rig
 
-from fisheye_testing.data import data_folder
+from fisheye_testing.data import real_data
 from fisheye_testing.waiting import wait_for
 
 START_S = 60.0
@@ -16,33 +17,16 @@ CONFIDENT = 0.7
 
 def started(rig, watcher, name, composed=True):
     """Run a rig's images; return its truth once its overlaps were measured."""
-    folder = data_folder('field', name)
+    folder = real_data('field', name)
     truth = json.loads((folder / 'truth.json').read_text())
-    cameras = {
-        camera: {
-            'source': str(folder / f'{camera}.png'),
-            'camera_info_url': f'{folder}/{camera}.yaml',
-        }
-        for camera in truth['cameras']
-    }
-    rig.start_all(composed, cameras, frame_rate_hz=5.0)
-
-    def is_measured():
-        rig.check_alive()
-        return watcher.overlaps and all(one.method for one in watcher.overlaps.overlaps)
-
-    wait_for(is_measured, START_S, 'the overlaps')
+    rig.start_all(composed, folder_rig(folder).cameras, frame_rate_hz=5.0)
+    wait_for(lambda: rig.check_alive() or watcher.is_measured, START_S, 'the overlaps')
     wait_for(lambda: watcher.projection and watcher.newest, START_S, 'a panorama')
     return truth
 
 
 def bearings_deg(truth):
-    return dict(zip(truth['cameras'], (axis[0] for axis in axes(truth)), strict=True))
-
-
-def axes(truth):
-    values = truth['axes_deg']
-    return [values[c] for c in truth['cameras']] if isinstance(values, dict) else values
+    return {camera: truth['axes_deg'][camera][0] for camera in truth['cameras']}
 
 
 @pytest.mark.parametrize(

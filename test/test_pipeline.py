@@ -25,12 +25,7 @@ SCHEDULING = 0.2
 def start(rig, watcher, *, composed=False, folder=None, **capture):
     rig.start_all(composed, camera_parameters(folder), frame_rate_hz=RATE_HZ, **capture)
     wait_for(lambda: rig.check_alive() or watcher.newest, START_S, 'a first panorama')
-    wait_for(lambda: watcher.projection and is_measured(watcher), START_S, 'the latched topics')
-
-
-def is_measured(watcher):
-    """Return whether the overlap was looked for; a lone camera is shown for a while too."""
-    return watcher.overlaps and all(overlap.method for overlap in watcher.overlaps.overlaps)
+    wait_for(lambda: watcher.projection and watcher.is_measured, START_S, 'the latched topics')
 
 
 def captured_stamps(watcher):
@@ -135,7 +130,7 @@ def test_the_one_node_takes_cameras_that_other_nodes_read(rig, watcher, transpor
     for side in SIDES:
         rig.start(f'{side}/capture')
     rig.start('panorama', transport=transport, **{f'{side}.source': 'topic' for side in SIDES})
-    wait_for(lambda: rig.check_alive() or is_measured(watcher), START_S, 'an overlap')
+    wait_for(lambda: rig.check_alive() or watcher.is_measured, START_S, 'an overlap')
     (overlap,) = watcher.overlaps.overlaps
     assert overlap.offset_deg == pytest.approx(140, abs=0.5)
     taken = [watcher.node.count_subscribers(f'left/image_raw{end}') for end in ('', '/compressed')]

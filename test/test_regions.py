@@ -1,6 +1,5 @@
 """Two lenses in one stream: the cameras share its reader, and each is a region of its frames."""
 
-import os
 from math import pi, radians
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import pytest
 from ament_index_python.packages import get_package_share_directory
 from field import write_pictures
 
+from fisheye_testing.data import real_data
 from fisheye_testing.health import Health
 from fisheye_testing.mjpeg_server import MjpegServer
 from fisheye_testing.rig import SIDES, executable
@@ -20,22 +20,6 @@ CLOSE_PX = 1.5
 """Of an overlap; JPEG moves it a little."""
 JPEG_LEVELS = 6.0
 """Mean difference that coding a picture once more may make."""
-
-
-@pytest.fixture
-def real_data():
-    """Return the path of a file of real pictures."""
-
-    def path(name):
-        found = Path(os.environ.get('FISHEYE_DATA', ''), name)
-        if not found.is_file():
-            message = f'{found} is not there: real pictures are looked for in $FISHEYE_DATA'
-            if os.environ.get('REQUIRE_DATA') == '1':
-                pytest.fail(message)
-            pytest.skip(message)
-        return found
-
-    return path
 
 
 @pytest.fixture
@@ -142,8 +126,8 @@ def test_lenses_of_a_topic_that_camera_infos_describe(rig, watcher, tmp_path, bo
     check_panorama(rig, watcher)
 
 
-def test_a_dual_fisheye_frame_becomes_a_closed_panorama(rig, watcher, real_data):
-    frame = real_data('gear360/frame.png')
+def test_a_dual_fisheye_frame_becomes_a_closed_panorama(rig, watcher):
+    frame = real_data('gear360', 'frame.png')
     nominal = Path(get_package_share_directory('panorama_stitch'), 'config/calibration')
     rig.start(
         'panorama',

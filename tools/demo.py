@@ -92,10 +92,7 @@ def demonstrate(
 def measured(rig: RigProcesses, watcher: Watcher) -> None:
     """Wait until every overlap was looked for."""
     wait_for(
-        lambda: (
-            rig.check_alive()
-            or (watcher.overlaps and all(each.method for each in watcher.overlaps.overlaps))
-        ),
+        lambda: rig.check_alive() or watcher.is_measured,
         START_TIMEOUT_S,
         'the measurement of the overlaps',
     )

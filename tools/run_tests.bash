@@ -2,7 +2,7 @@
 # `make test` calls this in a shell that has sourced env.bash.
 
 export PYTHONDONTWRITEBYTECODE=1  # no caches among the sources
-for domain in $(shuf -i 1-100); do  # apart from other tests on this machine, as tools/rig.py does
+for domain in $(shuf -i 1-100); do  # apart from other tests on this machine, as fisheye_testing.rig does
   exec 9> "${TMPDIR:-/tmp}/fisheye-domain-$domain.lock"
   flock --nonblock 9 && break
 done

@@ -34,7 +34,7 @@ class Encoder:
 
     def __init__(self, url: str, container: str, options: dict[str, str], arguments, relay=None):
         self._output = av.open(url, 'w', format=container, options=options)
-        codec = {'h264': 'libx264', 'h265': 'libx265', 'mjpeg': 'mjpeg'}[arguments.codec]
+        codec = {'h264': 'libx264', 'mjpeg': 'mjpeg'}[arguments.codec]
         stream = self._output.add_stream(codec, rate=round(arguments.rate))
         stream.width, stream.height = arguments.width, arguments.height
         stream.pix_fmt = 'yuvj420p' if arguments.codec == 'mjpeg' else 'yuv420p'
@@ -44,11 +44,10 @@ class Encoder:
         if codec == 'libx264':
             stream.options = {
                 'preset': 'ultrafast',
-                'tune': '' if arguments.b_frames else 'zerolatency',
+                'tune': 'zerolatency',
                 'x264-params': f'keyint={gop}:min-keyint={gop}:scenecut=0:repeat-headers=1'
-                f':bframes={arguments.b_frames}:slices=1:sliced-threads=0',
+                ':bframes=0:slices=1:sliced-threads=0',
             }
-            stream.options = {name: value for name, value in stream.options.items() if value}
         if arguments.codec == 'mjpeg':
             stream.options = {'huffman': 'default', 'force_duplicated_matrix': '1'}
         stream.codec_context.thread_count = 1

@@ -8,15 +8,15 @@ import pytest
 DATA = Path(os.environ.get('FISHEYE_DATA', ''))
 
 
-def data_folder(*parts: str) -> Path:
-    """Return a folder of real pictures; without it the test is skipped, or fails.
+def real_data(*parts: str) -> Path:
+    """Return a file or folder of real pictures; without it the test is skipped, or fails.
 
     It fails where the environment has REQUIRE_DATA=1.
     """
-    folder = DATA.joinpath(*parts)
-    if not folder.is_dir():
-        message = f'{folder} is not there: real pictures are looked for in $FISHEYE_DATA'
+    path = DATA.joinpath(*parts)
+    if not path.exists():
+        message = f'{path} is not there: real pictures are looked for in $FISHEYE_DATA'
         if os.environ.get('REQUIRE_DATA') == '1':
             pytest.fail(message)
         pytest.skip(message)
-    return folder
+    return path

@@ -61,7 +61,6 @@ def main() -> None:
     parser.add_argument('--rate', type=float, default=30.0, help='pictures a second')
     parser.add_argument('--gop', type=float, default=1.0, help='s between keyframes')
     parser.add_argument('--join-late', action='store_true', help='no keyframe for who comes')
-    parser.add_argument('--b-frames', type=int, default=0)
     parser.add_argument('--loss', type=float, default=0.0, help='share of what is sent')
     parser.add_argument('--password', default='', help='of the user called user')
     parser.add_argument('--redirect', default='', help='where /redirect leads')

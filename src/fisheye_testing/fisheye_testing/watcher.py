@@ -35,7 +35,8 @@ class Watcher:
     def __init__(self, domain: int, namespace: str = ''):
         self.stamps_ns: list[int] = []
         self.latencies_ms: list[float] = []
-        self.newest = self.projection = self.overlaps = None
+        self.newest = self.projection = None
+        self.overlaps: Overlaps | None = None
         self._context = rclpy.Context()
         rclpy.init(context=self._context, domain_id=domain)
         self.node = rclpy.create_node('watcher', context=self._context, namespace=namespace)
@@ -61,6 +62,11 @@ class Watcher:
         self._executor.shutdown()
         self.node.destroy_node()
         rclpy.shutdown(context=self._context)
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether every overlap was looked for; a lone camera is shown for a while too."""
+        return bool(self.overlaps) and all(each.method for each in self.overlaps.overlaps)
 
     def restart(self) -> None:
         """Forget what came so far."""

@@ -15,12 +15,12 @@ def answered(sentence):
     return future
 
 
-def visit(scenario):
+def visit(scenario, deadline_s=DEADLINE_S):
     """Run a coroutine that takes a client session."""
 
     async def run():
         async with aiohttp.ClientSession() as session:
-            return await asyncio.wait_for(scenario(session), DEADLINE_S)
+            return await asyncio.wait_for(scenario(session), deadline_s)
 
     return asyncio.run(run())
 
@@ -32,6 +32,10 @@ def address(server, path=''):
 def here(server, path=''):
     """Return an address of a server that serves other machines, as this machine reaches it."""
     return f'http://127.0.0.1:{server.address.rpartition(":")[2]}{path}'
+
+
+def token(server):
+    return server.url.partition('#token=')[2]
 
 
 def request(method, url, **arguments):

@@ -11,7 +11,7 @@ from concurrent.futures import Future
 
 import aiohttp
 import pytest
-from serving import DEADLINE_S, address, here, picture, request, state, visit
+from serving import DEADLINE_S, address, here, picture, request, state, token, visit
 
 from fisheye_core.errors import FileAccessError, FileContentError
 from panorama_viewer import browser, connection
@@ -23,10 +23,6 @@ REFUSED, LATER = 1008, 1013
 def look(session, server, token=None):
     protocols = ('panorama', f'token.{token}') if token else ()
     return session.ws_connect(here(server, 'live'), protocols=protocols)
-
-
-def token(server):
-    return server.url.partition('#token=')[2]
 
 
 async def farewell(stream):

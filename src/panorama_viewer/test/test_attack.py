@@ -4,11 +4,13 @@ import asyncio
 import json
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import aiohttp
 import attack
 import pytest
+import serving
 
 DEADLINE_S = 20.0
 PICTURES = 24
@@ -75,12 +77,7 @@ def attackers():
         process.communicate()
 
 
-def visit(scenario):
-    async def run():
-        async with aiohttp.ClientSession() as session:
-            return await asyncio.wait_for(scenario(session), DEADLINE_S)
-
-    return asyncio.run(run())
+visit = partial(serving.visit, deadline_s=DEADLINE_S)
 
 
 async def pictures(stream, count):

@@ -8,7 +8,7 @@ from urllib.parse import urlsplit
 
 import aiohttp
 import pytest
-from serving import DEADLINE_S, address, answered, picture, request, state, visit
+from serving import DEADLINE_S, address, answered, here, picture, request, state, token, visit
 
 import panorama_viewer
 from fisheye_core.errors import OverlapError, SettingError
@@ -191,16 +191,16 @@ def test_who_says_something_else_is_shown_out(serve, words):
 def test_only_who_knows_the_token_may_press_buttons_from_elsewhere(serve):
     pressed = []
     server = serve(lambda: pressed.append(1) or answered('measured'), host='0.0.0.0')
-    token = server.url.partition('#token=')[2]
-    here = f'http://127.0.0.1:{server.url.split(":")[2].split("/")[0]}/'
-    assert token
+    assert token(server)
     for button in ('calibrate', 'snapshot'):
         for headers in ({}, {'X-Token': 'guess'}, {'X-Token': ''}):
-            status, words, _ = request('POST', here + button, headers=headers)
+            status, words, _ = request('POST', here(server, button), headers=headers)
             assert status == 403
             assert b'token' in words
     assert not pressed
-    status, words, _ = request('POST', here + 'calibrate', headers={'X-Token': token})
+    status, words, _ = request(
+        'POST', here(server, 'calibrate'), headers={'X-Token': token(server)}
+    )
     assert (status, words) == (200, b'measured')
 
 
@@ -242,16 +242,12 @@ def test_a_port_in_use_is_a_sentence():
 
 
 def test_an_address_of_another_machine_is_a_sentence():
-    server = ViewerServer(
-        ViewerSettings(host='203.0.113.7', port=0), calibrate=None, watched=None, report=None
-    )
+    server = unserved(host='203.0.113.7', port=0)
     with pytest.raises(SettingError, match=r'cannot serve on port 0 of 203\.0\.113\.7'):
         server.start()
 
 
 def test_a_name_that_cannot_be_one_is_a_sentence():
-    server = ViewerServer(
-        ViewerSettings(host='....', port=0), calibrate=None, watched=None, report=None
-    )
+    server = unserved(host='....', port=0)
     with pytest.raises(SettingError, match=r'cannot serve on port 0 of \.\.\.\.: '):
         server.start()

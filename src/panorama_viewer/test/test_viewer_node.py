@@ -1,15 +1,16 @@
 """The viewer node in this process, with a node beside it in the place of the stitching."""
 
-import asyncio
 import json
 import threading
 import time
 from array import array
+from functools import partial
 from math import nan, tau
 
 import aiohttp
 import pytest
 import rclpy
+import serving
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from fisheye_msgs.msg import Overlap, Overlaps, Projection
 from fisheye_msgs.srv import CalibrateOverlap
@@ -106,12 +107,7 @@ def viewer(ros, **parameters):
     )
 
 
-def visit(scenario):
-    async def run():
-        async with aiohttp.ClientSession() as session:
-            return await asyncio.wait_for(scenario(session), DEADLINE_S)
-
-    return asyncio.run(run())
+visit = partial(serving.visit, deadline_s=DEADLINE_S)
 
 
 def look(node):

@@ -37,7 +37,11 @@ export class Projection {
       throw new Error(`this page cannot show a ${this.surface} panorama; `
         + `expected ${Object.keys(SURFACES).join(', ')}`);
     }
-    this.kind = SURFACES[this.surface];
+  }
+
+  /** How the surface maps rays. No property of its own: those are what the message says. */
+  get kind() {
+    return SURFACES[this.surface];
   }
 
   /** Ray of a pixel; integers are pixel centres. */
