@@ -66,7 +66,7 @@ class Watcher:
     @property
     def is_measured(self) -> bool:
         """Whether every overlap was looked for; a lone camera is shown for a while too."""
-        return bool(self.overlaps) and all(each.method for each in self.overlaps.overlaps)
+        return self.overlaps is not None and all(each.method for each in self.overlaps.overlaps)
 
     def restart(self) -> None:
         """Forget what came so far."""
