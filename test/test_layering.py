@@ -46,6 +46,7 @@ ROS = {
 }
 KEYS = {
     'numpy': 'python3-numpy',
+    'PIL': 'python3-pil',
     'cv2': 'python3-opencv',
     'yaml': 'python3-yaml',
     'scipy': 'python3-scipy',

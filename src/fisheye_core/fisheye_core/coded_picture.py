@@ -1,9 +1,13 @@
 """Coded pictures: decoded only after their head said how large they will be."""
 
+import struct
+import warnings
 from contextlib import suppress
+from io import BytesIO
 
 import cv2
 import numpy as np
+from PIL import Image
 
 from fisheye_core.errors import ImageFormatError
 from fisheye_core.quiet_jpeg import without_libjpeg_lines
@@ -14,6 +18,8 @@ _END = b'\xff\xd9'
 _SCAN = b'\xff\xda'
 _MAX_PIXELS = 50_000_000
 """A few bytes can claim to be more than fits into memory."""
+Image.MAX_IMAGE_PIXELS = None  # Pillow's own limit is a larger one, and its sentence has no size.
+_OTHER_KINDS = 'BMP', 'JPEG2000', 'PPM', 'TIFF', 'WEBP'
 _NO_FRAMES = 0xC4, 0xC8, 0xCC
 """Markers of tables among those that begin a frame."""
 
@@ -105,24 +111,34 @@ def pixels_of(coded: np.ndarray, *, grey: bool = False) -> np.ndarray:
     _check_claim(coded)
     kind = cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR
     image: np.ndarray | None = None
-    if coded.size:
-        with without_libjpeg_lines(), suppress(cv2.error):
-            image = cv2.imdecode(coded, kind | cv2.IMREAD_IGNORE_ORIENTATION)
+    with without_libjpeg_lines(), suppress(cv2.error):
+        image = cv2.imdecode(coded, kind | cv2.IMREAD_IGNORE_ORIENTATION)
     if image is None:
         raise ImageFormatError(f'{coded.size} bytes are a broken picture')
     return image
 
 
 def _check_claim(coded: np.ndarray) -> None:
-    """Refuse a JPEG or PNG whose head claims a size that no camera has."""
+    """Refuse a picture whose head claims a size that no camera has."""
     try:
         width, height = size_of(coded)
     except ImageFormatError:
-        return  # Of another kind, or none.
+        width, height = _size_of_other(coded)
     if not 1 <= width * height <= _MAX_PIXELS:
         raise ImageFormatError(
             f'a picture of {width}x{height} px; expected up to {_MAX_PIXELS / 1e6:g} million px'
         )
+
+
+def _size_of_other(coded: np.ndarray) -> tuple[int, int]:
+    """Return the width and height, px, that a picture of another kind than JPEG or PNG claims."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter('ignore')  # Of what is odd in tags that nobody needs.
+            with Image.open(BytesIO(coded.tobytes()), formats=_OTHER_KINDS) as picture:
+                return picture.size
+    except (OSError, ValueError, SyntaxError, TypeError, KeyError, struct.error) as error:
+        raise ImageFormatError(f'{coded.size} bytes are a broken picture') from error
 
 
 def _number(data: bytes | memoryview) -> int:

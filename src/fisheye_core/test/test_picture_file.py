@@ -1,5 +1,8 @@
 """Pictures on disk: found, read as the sensor gave them, and named where they cannot be."""
 
+import struct
+from contextlib import suppress
+
 import cv2
 import numpy as np
 import pytest
@@ -64,6 +67,40 @@ def test_a_file_that_is_no_picture_is_named(content, tmp_path):
     (tmp_path / 'odd.png').write_bytes(content)
     with pytest.raises(SourceError, match=r'odd\.png is not a picture that can be read'):
         read_picture(tmp_path / 'odd.png')
+
+
+def claiming(suffix):
+    """Return a file of a few bytes that claims to be larger than memory."""
+    coded = bytearray(cv2.imencode(suffix, PICTURE)[1])
+    at = {'.bmp': 18, '.jp2': coded.find(b'ihdr') + 4, '.ppm': 3, '.tif': -1}[suffix]
+    if suffix == '.tif':  # TIFF 6.0, section 2: twelve bytes an entry, the value behind eight
+        first = struct.unpack_from('<I', coded, 4)[0] + 2
+        for entry in (first, first + 12):
+            struct.pack_into('<HHII', coded, entry, coded[entry] | 0x100, 4, 1, 30_000)
+    elif suffix == '.ppm':
+        coded[at : at + 5] = b'30000 30000'
+    else:
+        struct.pack_into('<ii' if suffix == '.bmp' else '>ii', coded, at, 30_000, 30_000)
+    return bytes(coded)
+
+
+@pytest.mark.parametrize('suffix', ['.bmp', '.jp2', '.ppm', '.tif'])
+def test_a_claim_that_no_camera_makes_is_refused_before_it_is_decoded(suffix, tmp_path):
+    (tmp_path / f'huge{suffix}').write_bytes(claiming(suffix))
+    with pytest.raises(SourceError, match='30000x30000 px; expected up to 50 million px'):
+        read_picture(tmp_path / f'huge{suffix}')
+
+
+@pytest.mark.parametrize('suffix', sorted(SUFFIXES - {'.jpeg', '.pbm', '.pgm', '.tiff'}))
+def test_a_damaged_picture_is_read_or_refused(suffix, tmp_path):
+    random = np.random.default_rng(1)
+    whole = cv2.imencode(suffix, PICTURE)[1]
+    for _ in range(200):
+        damaged = whole[: random.integers(1, whole.size + 1)].copy()
+        damaged[random.integers(0, min(damaged.size, 80), 3)] = random.integers(0, 256, 3)
+        (tmp_path / f'odd{suffix}').write_bytes(damaged)
+        with suppress(SourceError):
+            assert read_picture(tmp_path / f'odd{suffix}').size <= 3 * 50_000_000
 
 
 def test_a_file_that_cannot_be_read_is_named(tmp_path):

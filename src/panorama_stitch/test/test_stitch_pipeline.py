@@ -17,6 +17,7 @@ from fisheye_core.errors import FileAccessError, ImageFormatError, OverlapError
 from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.remap import RemapTable
 from panorama_stitch.compose.compositor import Compositor
+from panorama_stitch.pipeline import compositor_builder
 from panorama_stitch.pipeline.metrics import economy_sentence, metrics, unpaired_sentence
 from panorama_stitch.pipeline.panorama_settings import PanoramaSettings
 from panorama_stitch.pipeline.stitch_pipeline import StitchPipeline
@@ -383,10 +384,12 @@ def test_the_published_rule_asked_for_once_ruins_no_rig(make_line, pictures):
     assert overlap_in_use(line) == asked
 
 
-def test_a_setting_that_changes_while_an_overlap_is_sought_need_not_wait(make_line, pictures):
+def test_a_setting_that_changes_while_an_overlap_is_sought_need_not_wait(
+    make_line, pictures, monkeypatch
+):
     line = make_line(replace(SETTINGS, stale_after_s=60.0))
     dark = {camera: np.zeros_like(picture) for camera, picture in pictures.items()}
-    measure = line.pipeline.rig.measure
+    measure = compositor_builder.measure_overlaps
     is_measuring, resume = threading.Event(), threading.Event()
 
     def measure_late(*arguments):
@@ -394,7 +397,7 @@ def test_a_setting_that_changes_while_an_overlap_is_sought_need_not_wait(make_li
         resume.wait(DEADLINE_S)
         return measure(*arguments)
 
-    line.pipeline.rig.measure = measure_late
+    monkeypatch.setattr(compositor_builder, 'measure_overlaps', measure_late)
     line.feed(dark, is_measuring.is_set, 'a search')
     line.pipeline.apply(replace(SETTINGS, stale_after_s=60.0, crop='none', feather_deg=3.0))
     is_measuring.clear()
