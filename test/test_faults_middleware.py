@@ -7,6 +7,7 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 from field import START_S
 from namespaces import Namespace
@@ -18,7 +19,12 @@ from fisheye_testing.watcher import Watcher
 
 TOOLS = Path(__file__).parents[1] / 'tools'
 RATE_HZ = 30.0
-ROUNDS = 5 if os.environ.get('LONG') else 2
+LONG = bool(os.environ.get('LONG'))
+ROUNDS = 5 if LONG else 2
+STOPS, HELD_UP = (50, 0) if LONG else (4, 1)
+"""How often a subscriber is stopped, and how often that may be noticed; it never is on a machine
+that does nothing else."""
+STOPPED_S, NOTICED_S = 1.0, 0.3
 LIVELY = 0.8
 """Share of the rate that a busy machine keeps."""
 WATCHED_S = 3.0
@@ -139,6 +145,22 @@ def test_a_starved_subscriber_starves_nobody_else(five, how):
     print(f'  {came} panoramas in {WATCHED_S:g} s, {usual} before; stitch grew by {grown:.1f} MiB')
     assert came > LIVELY * usual
     assert grown < FLAT_MIB
+
+
+def test_who_is_stopped_in_a_transfer_holds_up_nobody_else(five):
+    subscribe(five, 'stopped')
+    gaps_s = []
+    for _ in range(STOPS):
+        begin_s = time.monotonic()
+        five.processes['stopped'].send_signal(signal.SIGSTOP)
+        try:
+            wait_for(lambda s=begin_s: time.monotonic() > s + STOPPED_S, what='the end of a stop')
+        finally:
+            five.processes['stopped'].send_signal(signal.SIGCONT)
+        arrivals_s = [e.arrived_s for e in five.health.seen if e.arrived_s > begin_s - NOTICED_S]
+        gaps_s.append(max(np.diff([*arrivals_s, time.monotonic()])))
+    print(f'\n{STOPS} stops: longest gaps {np.round(sorted(gaps_s)[-3:], 2)} s')
+    assert sum(gap > NOTICED_S for gap in gaps_s) <= HELD_UP
 
 
 def test_two_systems_in_two_domains_do_not_meet(rig, watcher, domain, tmp_path):
