@@ -2,14 +2,9 @@
 # `make test` calls this in a shell that has sourced env.bash.
 
 export PYTHONDONTWRITEBYTECODE=1  # no caches among the sources
-for domain in $(shuf -i 1-100); do  # apart from other tests on this machine, as fisheye_testing.rig does
-  exec 9> "${TMPDIR:-/tmp}/fisheye-domain-$domain.lock"
-  flock --nonblock 9 && break
-done
-export ROS_DOMAIN_ID=$domain
 colcon test-result --delete-yes > /dev/null
-colcon test --base-paths src --executor sequential \
-  --event-handlers console_direct+ --return-code-on-test-failure
+colcon test --base-paths src --parallel-workers 2 \
+  --event-handlers console_cohesion+ --return-code-on-test-failure
 packages=$?
 python -m pytest test
 across=$?

@@ -43,14 +43,20 @@ def executable(node: str) -> Path:
 
 def unused_domain() -> int:
     """Pick a ROS domain that no other test on this machine uses."""
+    domain, lock = locked_domain()
+    _domain_locks.append(lock)
+    while len(_domain_locks) > _MOST_DOMAINS:
+        _domain_locks.popleft().close()
+    return domain
+
+
+def locked_domain() -> tuple[int, IO[str]]:
+    """Pick such a domain, and return it with the open file that keeps it."""
     for domain in random.sample(range(1, 101), 100):
         lock = Path(tempfile.gettempdir(), f'fisheye-domain-{domain}.lock').open('w')  # noqa: SIM115
         with suppress(BlockingIOError):
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            _domain_locks.append(lock)
-            while len(_domain_locks) > _MOST_DOMAINS:
-                _domain_locks.popleft().close()
-            return domain
+            return domain, lock
         lock.close()
     raise RuntimeError('every ROS domain from 1 to 100 is in use by a test')
 
