@@ -4,9 +4,10 @@
 export PYTHONDONTWRITEBYTECODE=1  # no caches among the sources
 colcon test-result --delete-yes > /dev/null
 colcon test --base-paths src --parallel-workers 2 \
-  --event-handlers console_cohesion+ --return-code-on-test-failure
+  --event-handlers console_cohesion+ --return-code-on-test-failure \
+  --pytest-args --numprocesses 2
 packages=$?
-python -m pytest test
+python -m pytest --numprocesses 2 --dist loadfile test
 across=$?
 fastdds shm clean &> /dev/null  # a node that a test kills leaves its 64 MiB in /dev/shm
 if [ $packages != 0 ]; then

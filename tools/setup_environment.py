@@ -23,7 +23,13 @@ REQUIREMENTS = ROOT / 'requirements.txt'
 DONE = VENV / '.done'
 VERSION = '{}.{}'.format(*sys.version_info[:2])
 # Distributions whose module has another name.
-MODULES = {'empy': 'em', 'opencv-python-headless': 'cv2', 'pyyaml': 'yaml'}
+MODULES = {
+    'empy': 'em',
+    'opencv-python-headless': 'cv2',
+    'pillow': 'PIL',
+    'pytest-xdist': 'xdist',
+    'pyyaml': 'yaml',
+}
 
 
 def main():

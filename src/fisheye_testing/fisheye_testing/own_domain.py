@@ -11,6 +11,6 @@ _LOCK = pytest.StashKey[IO[str]]()
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Give this process a ROS domain for as long as it runs."""
+    """Keep a ROS domain for this process alone for as long as it runs."""
     domain, config.stash[_LOCK] = locked_domain()
     os.environ['ROS_DOMAIN_ID'] = str(domain)
