@@ -73,8 +73,8 @@ def test_what_a_user_edits_is_what_the_packages_install():
 
 @pytest.mark.parametrize('setup', SETUPS, ids=lambda path: path.parent.name)
 def test_every_executable_is_installed_and_has_a_main(setup):
-    scripts = keywords(setup).get('entry_points')
-    for script in ast.literal_eval(scripts)['console_scripts'] if scripts else []:
+    entries = keywords(setup).get('entry_points')
+    for script in ast.literal_eval(entries or '{}').get('console_scripts', []):
         name, module = script.removesuffix(':main').split(' = ')
         package = setup.parent.name
         assert os.access(ROOT / 'install' / package / 'lib' / package / name, os.X_OK)
