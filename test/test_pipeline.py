@@ -10,6 +10,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage
 
 from fisheye_bridge.camera_info import camera_of
 from fisheye_bridge.stamps import ns_of
+from fisheye_capture.capture_settings import CaptureSettings
 from fisheye_testing.rig import COMPOSED, SEPARATE, SIDES, camera_parameters
 from fisheye_testing.waiting import wait_for
 
@@ -18,6 +19,7 @@ WATCHED_S = float(os.environ.get('WATCHED_S', '8'))
 START_S = 40.0
 STOP_S = 2.0
 CLOSE_PX = 1.0
+FOV_DEG = CaptureSettings().synthetic_fov_deg
 SCHEDULING = 0.2
 """Share of the frames that a busy machine may not even take."""
 
@@ -78,7 +80,16 @@ def test_the_synthetic_rig_is_stitched_where_it_should_be(rig, watcher):
     answer = watcher.calibrate()
     assert answer.success
     assert answer.overlaps[0].offset_x_px == pytest.approx(true_px, abs=CLOSE_PX)
+    assert math.isnan(answer.overlaps[0].seam_begin_px), 'nothing is drawn with it yet'
     projection = watcher.projection
+    right_begin_deg, left_end_deg = (
+        math.degrees((edge_px - 0.5 - projection.center_x_px) / projection.focal_px)
+        for edge_px in (overlap.right_begin_px, overlap.left_end_px)
+    )
+    assert right_begin_deg == pytest.approx(70 - FOV_DEG / 2, abs=0.5)
+    assert left_end_deg == pytest.approx(FOV_DEG / 2 - 70, abs=0.5)
+    seam_px = overlap.seam_begin_px, overlap.seam_end_px
+    assert overlap.right_begin_px <= seam_px[0] < seam_px[1] <= overlap.left_end_px
     size = (projection.height, projection.width, 3)
     wait_for(lambda: watcher.picture().shape == size, START_S, 'a panorama of that projection')
     assert watcher.picture().any(axis=2).all(), 'no black inside'

@@ -30,6 +30,8 @@ COARSE_DB = 32.0
 """The inner edge of a mirror's ring has half the resolution."""
 SEAMLESS = 1.5
 """How much more the columns beside the edge of a closed panorama may differ than others do."""
+CLOSE_DEG = 0.5
+"""A pixel of these panoramas and a half."""
 STAMP_NS = 700_000_000
 FISHEYE = synthetic_lens(320, 240, np.radians(170))
 WIDE = synthetic_lens(400, 400, np.radians(200)).with_max_angle(np.radians(100))
@@ -39,6 +41,7 @@ PLAIN = make_lens('plumb_bob', 240, 180, [148.2, 0, 119.5, 0, 148.2, 89.5, 0, 0,
 MIRROR = AnnularLens(480, 480, 235, 235, 239.5, 239.5, (0.5, *np.radians([-35, 20]), -1.0))
 
 RIGS = {
+    'level pair': ([(-70, 0, 0), (70, 0, 0)], FISHEYE, False),
     'looking down': ([(-70, -15, 0), (70, -15, 0)], FISHEYE, False),
     'not alike': ([(-70, -4, 3), (70, -8, -5)], FISHEYE, False),
     'upside down': ([(-70, 0, 180), (70, 0, 180)], FISHEYE, False),
@@ -116,6 +119,37 @@ def test_a_closed_panorama_leads_all_around_and_nobody_sees_its_edge(name):
     assert layout.surface.width == pytest.approx(2 * np.pi * layout.surface.focal_px)
     steps = np.abs(np.diff(out.astype(float), axis=1, append=out[:, :1])).mean(axis=(0, 2))
     assert steps[-1] <= SEAMLESS * np.quantile(steps, 0.9)
+
+
+@pytest.mark.parametrize(
+    ('name', 'fov_deg'), [('a turned ring', 170), ('six conventional', 78), ('level pair', 170)]
+)
+def test_the_layout_knows_how_far_each_camera_sees(name, fov_deg):
+    layout, _ = composed(*rig(name), Style())
+    surface = layout.surface
+    edges_px = np.array([(0, surface.width), *layout.fields]) - 0.5 - surface.center_x_px
+    ends_deg, *fields_deg = np.degrees(edges_px / surface.focal_px)
+    for (yaw_deg, *_), edges_deg in zip(RIGS[name][0], fields_deg, strict=True):
+        true_deg = [yaw_deg - fov_deg / 2, yaw_deg + fov_deg / 2]
+        if not layout.wraps:
+            true_deg = np.clip(true_deg, *ends_deg)
+        off_deg = (np.subtract(edges_deg, true_deg) + 180) % 360 - 180
+        assert off_deg == pytest.approx([0, 0], abs=CLOSE_DEG)
+
+
+@pytest.mark.parametrize('name', ['a turned ring', 'level pair', 'three wide', 'upside down'])
+def test_the_seam_of_two_neighbours_lies_where_both_see(name):
+    layout, _ = composed(*rig(name), Style())
+    count, width = len(layout.fields), layout.surface.width
+    for index in range(count if layout.wraps else count - 1):
+        left, right = index, (index + 1) % count
+        seam = layout.seam(left, right)
+        assert seam == layout.seam(right, left)
+        middle = sum(seam) / 2
+        for begin, end in (layout.fields[left], layout.fields[right]):
+            assert any(begin < middle + aside < end for aside in (-width, 0, width))
+    if count > 2:
+        assert layout.seam(0, 2 if layout.wraps else count - 1) is None
 
 
 def test_no_bearing_is_shown_twice_where_two_wide_lenses_stay_open():

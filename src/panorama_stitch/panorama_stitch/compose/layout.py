@@ -39,6 +39,9 @@ class Layout:
         Indices of the cameras as they follow each other from left to right.
     seams
         One for each camera of `order` and the next one; the closing seam last.
+    fields
+        Columns [begin, end) of each camera, in the rig's order, in which it sees anything, shown
+        or not; on a closed panorama they may go beyond its edges.
     wraps
         Whether the right edge of the panorama meets its left one.
     origin
@@ -48,8 +51,15 @@ class Layout:
     surface: Surface
     order: tuple[int, ...]
     seams: tuple[Seam, ...]
+    fields: tuple[tuple[int, int], ...]
     wraps: bool = False
     origin: tuple[int, int] = (0, 0)
+
+    def seam(self, one: int, other: int) -> Seam | None:
+        """Return where a camera fades into the next; None for two that are no neighbours."""
+        pairs = zip(self.order, (*self.order[1:], self.order[0]), strict=True)
+        seams = dict(zip(pairs, self.seams, strict=False))
+        return seams.get((one, other)) or seams.get((other, one))
 
     def drawn(self, index: int) -> tuple[int, int]:
         """Columns [begin, end) in which a camera is drawn, those of its seams among them.
@@ -102,7 +112,9 @@ def lay_out(placed: Placed, *, fade_px: float, crop: str) -> Layout:
             seam = Seam(*(max(edge, seams[-1].end) for edge in seam))
         seams.append(seam)
     order = tuple(view.index for view in placed.views)
-    layout = Layout(placed.surface, order, tuple(seams), placed.wraps)
+    by_camera = sorted(placed.views, key=lambda view: view.index)
+    fields = tuple((view.begin, view.end) for view in by_camera)
+    layout = Layout(placed.surface, order, tuple(seams), fields, placed.wraps)
     return layout if crop == 'none' else _cropped(layout, placed)
 
 
@@ -150,12 +162,15 @@ def _cropped(layout: Layout, placed: Placed) -> Layout:
     x, y, width, height = valid_rectangle(
         covered(layout, placed), layout.surface, wraps=layout.wraps
     )
-    seams = layout.seams
-    if not layout.wraps:
-        seams = tuple(Seam(*(min(max(edge - x, 0), width) for edge in seam)) for seam in seams)
-    return replace(
-        layout, surface=layout.surface.window(x, y, width, height), seams=seams, origin=(x, y)
-    )
+    surface = layout.surface.window(x, y, width, height)
+    if layout.wraps:
+        return replace(layout, surface=surface, origin=(x, y))
+
+    def inside(columns: tuple[int, int]) -> Seam:
+        return Seam(*(min(max(edge - x, 0), width) for edge in columns))
+
+    seams, fields = (tuple(map(inside, each)) for each in (layout.seams, layout.fields))
+    return replace(layout, surface=surface, seams=seams, fields=fields, origin=(x, y))
 
 
 def covered(layout: Layout, placed: Placed) -> np.ndarray:

@@ -138,9 +138,9 @@ class PanoramaBase(Node):
         """Publish what is in use from this panorama on, for those who come later too."""
         self._announced = panorama.compositor
         header = _header(panorama.stamp_ns)
-        wraps = panorama.compositor.layout.wraps
-        self._projection.publish(projection_of(panorama.surface, header, wraps=wraps))
-        overlaps = overlap_messages(self.pipeline.overlaps, self.pipeline.rig, FRAME_ID)
+        layout, rig = panorama.compositor.layout, self.pipeline.rig
+        self._projection.publish(projection_of(panorama.surface, header, wraps=layout.wraps))
+        overlaps = overlap_messages(self.pipeline.overlaps, rig, FRAME_ID, layout)
         self._overlaps.publish(Overlaps(header=header, overlaps=overlaps))
 
     async def _calibrate(self, request, response):

@@ -2,36 +2,66 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from math import degrees
+from math import degrees, nan
 
 from fisheye_msgs.msg import Overlap, Particle
 from std_msgs.msg import Header
 
 from fisheye_bridge.stamps import stamp_of
 from fisheye_geometry.attitude import LEVEL
-from fisheye_geometry.rig import pairs_for
+from fisheye_geometry.rig import Pair, pairs_for
 from fisheye_geometry.surface import Surface
+from panorama_stitch.compose.layout import Layout
 from panorama_stitch.overlap.overlap_result import Overlap as OverlapResult
 from panorama_stitch.overlap.overlap_result import yaw_between_rad
 from panorama_stitch.pipeline.rig_state import RigState
 
 
 def overlap_messages(
-    results: Sequence[OverlapResult], rig: RigState, frame_id: str
+    results: Sequence[OverlapResult],
+    rig: RigState,
+    frame_id: str,
+    layout: Layout | None = None,
 ) -> list[Overlap]:
-    """Return a message for the overlap of each pair of a rig, in its order."""
+    """Return a message for the overlap of each pair of a rig, in its order.
+
+    Parameters
+    ----------
+    results
+        What is known of each pair.
+    rig
+        The cameras.
+    frame_id
+        Of the panorama.
+    layout
+        The panorama's, where the overlaps are those that it is drawn with.
+    """
     cameras, surfaces = rig.cameras, rig.surfaces
     return [
         _message(
             result,
-            (cameras[left], cameras[right]),
-            (surfaces[left], surfaces[right]),
+            (cameras[pair.left], cameras[pair.right]),
+            (surfaces[pair.left], surfaces[pair.right]),
             frame_id,
+            _columns(layout, pair),
         )
-        for result, (left, right) in zip(
-            results, pairs_for(len(cameras), len(results)), strict=True
-        )
+        for result, pair in zip(results, pairs_for(len(cameras), len(results)), strict=True)
     ]
+
+
+def _columns(layout: Layout | None, pair: Pair) -> dict[str, float]:
+    """Return the columns of the panorama in which a pair meets, by their names in messages."""
+    seam = layout and layout.seam(*pair)
+    if not layout or not seam:
+        return dict.fromkeys(
+            ('seam_begin_px', 'seam_end_px', 'right_begin_px', 'left_end_px'), nan
+        )
+    return {
+        'seam_begin_px': float(seam.begin),
+        'seam_end_px': float(seam.end),
+        'right_begin_px': float(layout.fields[pair.right][0]),
+        'left_end_px': float(layout.fields[pair.left][1]),
+    }
 
 
 def _message(
@@ -39,6 +69,7 @@ def _message(
     names: tuple[str, str],
     surfaces: tuple[Surface, Surface],
     frame_id: str,
+    columns: dict[str, float],
 ) -> Overlap:
     attitude = result.attitude or LEVEL
     yaw_deg = degrees(yaw_between_rad(result.offset_x_px, *surfaces))
@@ -62,4 +93,5 @@ def _message(
         right_particles=[Particle(**asdict(particle)) for particle in result.right_particles],
         left_match=result.left_match,
         right_match=result.right_match,
+        **columns,
     )
