@@ -38,3 +38,18 @@ class ViewerSettings:
         minimum=0.1,
         maximum=60.0,
     )
+    robot_width_m: float = setting(
+        0.0,
+        'Width of the robot: how far apart the lines of its path are on the page. 0: not known, '
+        'and no path is shown.',
+        minimum=0.0,
+        maximum=20.0,
+        live=True,
+    )
+    camera_height_m: float = setting(
+        0.0,
+        'Height of the cameras above the ground, for the same lines. 0: not known.',
+        minimum=0.0,
+        maximum=20.0,
+        live=True,
+    )

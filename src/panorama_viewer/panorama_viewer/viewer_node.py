@@ -26,6 +26,11 @@ from panorama_viewer.status import ViewerStatus, measured
 from panorama_viewer.token import print_on_terminal
 
 _TELL_S = 0.5
+_NUMBERS = (
+    *('confidence', 'yaw_deg', 'near_deg'),
+    *('seam_begin_px', 'seam_end_px', 'right_begin_px', 'left_end_px'),
+)
+"""Of an overlap."""
 
 
 class ViewerNode(Node):
@@ -35,7 +40,7 @@ class ViewerNode(Node):
 
     def __init__(self, **kwargs):
         super().__init__('viewer', **kwargs)
-        self._declared = Parameters(self, ViewerSettings)
+        self._declared = Parameters(self, ViewerSettings, on_change=self._apply)
         self._status = ViewerStatus()
         self._image = None
         self._faults: list[str] = []
@@ -54,6 +59,7 @@ class ViewerNode(Node):
             report=self._note_fault,
         )
         self._server.start()
+        self._apply(self._declared.settings)
         # The page goes on while a recording, and with it the time of ROS, stands still.
         self.create_timer(_TELL_S, self._tell, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._diagnostics = Diagnostics(self, self._report)
@@ -68,6 +74,12 @@ class ViewerNode(Node):
         """Close the connections to browsers too."""
         self._server.stop()
         super().destroy_node()
+
+    def _apply(self, settings: ViewerSettings) -> None:
+        """Tell the pages what the robot is like."""
+        self._server.tell(
+            robot_width_m=settings.robot_width_m, camera_height_m=settings.camera_height_m
+        )
 
     def _tell_where(self) -> None:
         """Log the address; the token goes to the terminal, because logs are read by others."""
@@ -157,7 +169,7 @@ class ViewerNode(Node):
 
 def _entry(overlap: Overlap) -> dict[str, Any]:
     """Return what the page shows of an overlap; JSON has no NaN."""
-    numbers = {name: getattr(overlap, name) for name in ('confidence', 'yaw_deg', 'near_deg')}
+    numbers = {name: getattr(overlap, name) for name in _NUMBERS}
     entry = {
         'left': overlap.left_camera,
         'right': overlap.right_camera,

@@ -153,6 +153,8 @@ def test_the_page_is_told_what_the_rig_says(ros):
             found=True,
             yaw_deg=120.0,
             confidence=confidence,
+            seam_begin_px=240.0,
+            left_end_px=confidence,
         )
         for confidence in (0.9, nan)
     ]
@@ -176,6 +178,8 @@ def test_the_page_is_told_what_the_rig_says(ros):
     assert told['projection']['wraps'] is True
     # JSON has no NaN, and a browser would refuse it.
     assert [overlap['confidence'] for overlap in told['overlaps']] == [0.9, None]
+    assert [overlap['left_end_px'] for overlap in told['overlaps']] == [0.9, None]
+    assert told['overlaps'][0]['seam_begin_px'] == 240.0
     assert 'left and right overlap, 120.0° apart' in told['overlaps'][0]['words']
     assert [problem['text'] for problem in told['problems']] == ['Left camera: unplugged']
     assert told['skew_ms'] == 2.5

@@ -44,7 +44,7 @@ async function save(reply) {
 }
 
 /** Show a sentence for as long as it takes to read. */
-function say(sentence) {
+export function say(sentence) {
   const element = $('answer');
   element.textContent = sentence;
   element.hidden = false;

@@ -58,9 +58,10 @@ export function pressTo(canvas, viewer) {
   });
 }
 
-/** Keys: what they do is written in the buttons' titles too. */
-export function keysTo(viewer) {
+/** Keys, and `more` of them: what they do is written in the buttons' titles too. */
+export function keysTo(viewer, more) {
   const keys = {
+    ...more,
     ArrowLeft: () => viewer.step(-STEP, 0),
     ArrowRight: () => viewer.step(STEP, 0),
     ArrowUp: () => viewer.step(0, STEP),

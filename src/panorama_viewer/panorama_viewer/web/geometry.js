@@ -85,6 +85,7 @@ export function anglesOf([x, y, z]) {
 const START = { yaw: 0, pitch: 0, fov: Math.PI / 2 };
 const NARROWEST = Math.PI / 36;
 const WIDEST = (120 / 180) * Math.PI;
+const NEAREST = 0.02; // cosine of a ray's angle to the view's axis, for one that has a place
 
 /** A camera without distortion that is turned about the vertical and up or down. */
 export class View {
@@ -108,6 +109,15 @@ export class View {
       Math.cos(this.yaw), Math.sin(this.yaw)];
     const [y, z] = [v * cp - sp, v * sp + cp];
     return [u * cy + z * sy, y, z * cy - u * sy];
+  }
+
+  /** Point (u, v) of a ray; null for one that is not clearly before the view. */
+  point(ray) {
+    const along = ([x, y, z]) => x * ray[0] + y * ray[1] + z * ray[2];
+    const middle = this.ray(0, 0);
+    const depth = along(middle);
+    if (!(depth > NEAREST * Math.hypot(...ray))) return null;
+    return [along(this.ray(1, 0)) / depth - 1, along(this.ray(0, 1)) / depth - 1];
   }
 
   /** Look at a bearing and an angle above the horizon, as far as the panorama goes. */

@@ -2,6 +2,7 @@
 
 import { Buttons } from '/buttons.js';
 import * as controls from '/controls.js';
+import { stickTo } from '/gamepad.js';
 import { Live } from '/live.js';
 import { Screen } from '/screen.js';
 import { Status } from '/status.js';
@@ -16,7 +17,8 @@ class Viewer {
     controls.dragTo($('look'), this);
     controls.wheelTo($('whole'), this);
     controls.pressTo($('map'), this);
-    controls.keysTo(this);
+    controls.keysTo(this, screen.aids.keys);
+    stickTo(this);
     $('toggle').addEventListener('click', () => this.toggle());
     $('whole').addEventListener('click', (event) => {
       this.lookAt($('whole'), controls.inside($('whole'), event));
@@ -99,6 +101,7 @@ const live = new Live(token, {
     }
     buttons.needToken = state.needs_token;
     status.take({ ...state, problems });
+    screen.aids.take(state);
   },
   async picture(blob) {
     if (await screen.picture(blob)) status.picture();

@@ -1,7 +1,7 @@
 // The bearing scale under the picture, and the bearing under the pointer.
 
 const STEPS = [1, 2, 5, 10, 15, 30, 45, 90];
-const ROOM = 46; // px that a label needs
+const ROOM = 3.8; // heights of the text that a label needs in width
 const DEGREE = Math.PI / 180;
 
 export class Scale {
@@ -23,7 +23,8 @@ export class Scale {
     pen.clearRect(0, 0, width, canvas.clientHeight);
     const style = getComputedStyle(canvas);
     pen.fillStyle = pen.strokeStyle = style.color;
-    pen.font = `500 12px ${style.fontFamily}`;
+    this.size = parseFloat(style.fontSize);
+    pen.font = `500 ${this.size}px ${style.fontFamily}`;
     pen.textAlign = 'center';
     const ticks = [];
     for (let degrees = first; degrees <= last; degrees++) {
@@ -31,15 +32,15 @@ export class Scale {
       if (x !== null && x >= 0 && x <= width) ticks.push([degrees, x]);
     }
     ticks.sort(([, x], [, other]) => x - other); // all around, 180° may be in the middle
-    const step = STEPS.find((s) => gap(ticks, s) >= ROOM) ?? STEPS.at(-1);
+    const step = STEPS.find((s) => gap(ticks, s) >= ROOM * this.size) ?? STEPS.at(-1);
     const fine = STEPS.find((s) => step % s === 0 && gap(ticks, s) >= 5) ?? step;
     pen.beginPath();
     for (const [degrees, x] of ticks) {
       if (degrees % fine) continue;
       pen.moveTo(x, 0);
       pen.lineTo(x, degrees % step ? 4 : 8);
-      if (degrees % step || x < 14 || x > width - 14) continue;
-      pen.fillText(`${degrees < 0 ? '−' : ''}${Math.abs(degrees)}°`, x, 22);
+      if (degrees % step || x < 1.2 * this.size || x > width - 1.2 * this.size) continue;
+      pen.fillText(`${degrees < 0 ? '−' : ''}${Math.abs(degrees)}°`, x, this.size + 10);
     }
     pen.stroke();
   }

@@ -1,5 +1,6 @@
 // What is on the screen: the whole panorama, or a view into it with a map; the scale under both.
 
+import { Aids } from '/aids.js';
 import { Projection, View, anglesOf } from '/geometry.js';
 import { Look } from '/look.js';
 import { Scale } from '/scale.js';
@@ -15,6 +16,7 @@ export class Screen {
     this.scale = new Scale($('scale'));
     this.whole = new Whole($('whole'));
     this.map = new Whole($('map'));
+    this.aids = new Aids(this);
     this.projection = this.bitmap = this.pointer = this.frame = null;
     try {
       this.look = new Look($('look'));
@@ -64,7 +66,7 @@ export class Screen {
   arrange() {
     const main = document.querySelector('main');
     const aspect = this.projection ? this.projection.width / this.projection.height : 2.4;
-    const rest = main.clientHeight - $('scale').offsetHeight;
+    const rest = main.clientHeight - $('scale').offsetHeight - $('rear').offsetHeight;
     const fit = (canvas, height) => {
       const width = Math.min(main.clientWidth, height * aspect);
       canvas.style.width = `${width}px`;
@@ -102,7 +104,29 @@ export class Screen {
       this.whole.draw(bitmap, projection);
     }
     this.scale.draw((bearing) => this.column(bearing), projection.limits);
+    this.aids.draw();
     this.point();
+  }
+
+  /** The canvas that shows the picture. */
+  get shown() {
+    return this.mode === 'look' ? $('look') : $('whole');
+  }
+
+  /** Bearing of the middle of the picture. */
+  get middle() {
+    return this.angles(this.shown, this.shown.clientWidth / 2, this.shown.clientHeight / 2)[0];
+  }
+
+  /** Where a ray lies on the picture, CSS px; null for nowhere. */
+  locate(ray) {
+    const { clientWidth: width, clientHeight: height } = this.shown;
+    if (this.mode === 'look') {
+      const point = this.view.point(ray);
+      return point && [width / 2 + this.focal * point[0], height / 2 + this.focal * point[1]];
+    }
+    const pixel = this.projection.pixel(ray);
+    return pixel && pixel.map((p) => ((p + 0.5) / this.projection.width) * width);
   }
 
   /** Where a bearing lies on the scale, CSS px; null for nowhere. */
@@ -135,7 +159,7 @@ export class Screen {
 
   /** Show the bearing under the pointer, or of the middle where there is none. */
   point() {
-    const shown = this.mode === 'look' ? $('look') : $('whole');
+    const { shown } = this;
     const middle = [shown, shown.clientWidth / 2, shown.clientHeight / 2];
     const [canvas, x, y] = this.pointer ?? middle;
     const angles = this.angles(canvas, x, y);

@@ -1,0 +1,18 @@
+// The bearings of the picture's left and right edge, under it.
+
+const outputs = ['left', 'right'].map((side) => {
+  const output = document.createElement('output');
+  output.className = 'edge';
+  output.id = `${side}-edge`;
+  return output;
+});
+document.getElementById('scale').append(...outputs);
+
+export function edges({ screen }) {
+  const { clientWidth: width, clientHeight: height } = screen.shown;
+  for (const [i, x] of [0, width].entries()) {
+    const [bearing] = screen.angles(screen.shown, x, height / 2);
+    const degrees = Math.round((bearing / Math.PI) * 180);
+    outputs[i].value = `${degrees < 0 ? '−' : ''}${Math.abs(degrees)}°`;
+  }
+}

@@ -1,0 +1,65 @@
+// For setting up: where one camera gives way to the next, and how far each of them sees.
+
+const SEAM = '#ff4fd8';
+const CAMERAS = ['#5ec8ff', '#9be15d', '#ffb347', '#c79bff'];
+const POINTS = 90;
+const ROOM = 22; // CSS px between the bars of neighbours, and above the first
+
+export function setup({ screen, sketch, state }) {
+  const { projection } = screen;
+  const overlaps = (state.overlaps ?? []).filter((overlap) => overlap.seam_begin_px != null);
+  for (const { seam_begin_px: begin, seam_end_px: end } of overlaps) {
+    sketch.line(column(projection, (begin + end) / 2), SEAM);
+    for (const edge of end > begin ? [begin, end] : []) {
+      sketch.line(column(projection, edge), SEAM, { width: 1.5, dash: [6, 6] });
+    }
+  }
+  for (const [i, { name, begin, end }] of fields(overlaps, projection).entries()) {
+    const color = CAMERAS[i % CAMERAS.length];
+    const y = row(screen, ROOM * (1 + (i % 2)));
+    sketch.line(sampled(begin, end, (x) => projection.ray(x - 0.5, y)), color, { width: 3 });
+    for (const edge of [begin, end]) {
+      sketch.line(column(projection, edge), color, { width: 1.5, dash: [3, 6] });
+    }
+    sketch.words(projection.ray(middle(screen, begin, end) - 0.5, y), name, color);
+  }
+}
+
+/** Columns [begin, end) in which each camera sees anything: the outer ones up to the edges. */
+function fields(overlaps, { width }) {
+  const cameras = new Map();
+  const field = (name) => cameras.get(name)
+    ?? cameras.set(name, { name, begin: 0, end: width }).get(name);
+  for (const overlap of overlaps) {
+    field(overlap.left).end = overlap.left_end_px;
+    field(overlap.right).begin = overlap.right_begin_px;
+  }
+  return [...cameras.values()];
+}
+
+/** The column of a field at which its name is seen: where one looks, as far as that is in it. */
+function middle({ projection, mode, view }, begin, end) {
+  if (mode === 'whole') return (begin + end) / 2;
+  const turn = projection.wraps ? projection.width : Infinity;
+  const [x] = projection.pixel([Math.sin(view.yaw), 0, Math.cos(view.yaw)]) ?? [0];
+  const beyond = [0, -turn, turn].find((aside) => begin <= x + aside && x + aside <= end) ?? 0;
+  return Math.min(Math.max(x + beyond, begin), end);
+}
+
+/** Rays down the edge on the left of a column. */
+function column(projection, x) {
+  return sampled(0, projection.height, (y) => projection.ray(x - 0.5, y - 0.5));
+}
+
+/** Row of the panorama that is so far below the top of what is shown. */
+function row(screen, y) {
+  const { projection, shown } = screen;
+  const [, up] = screen.angles(shown, shown.clientWidth / 2, y);
+  const [, place] = projection.pixel([0, -Math.tan(up), 1]);
+  return Math.min(Math.max(place, 0), projection.height - 1);
+}
+
+const sampled = (begin, end, at) => Array.from(
+  { length: POINTS + 1 },
+  (_, i) => at(begin + (i / POINTS) * (end - begin)),
+);
