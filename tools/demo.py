@@ -14,6 +14,7 @@ from known_rigs import SYNTHETIC_RIGS, KnownRig, folder_rig, synthetic_rig
 
 from fisheye_capture.capture_settings import CaptureSettings
 from fisheye_capture.synthetic import synthetic_lens
+from fisheye_capture.town import EYE_HEIGHT_M
 from fisheye_core.errors import FisheyeError
 from fisheye_geometry.camera_file import read_camera
 from fisheye_testing.rig import RigProcesses, unused_domain
@@ -23,6 +24,7 @@ from fisheye_undistort.correction import Correction
 from fisheye_undistort.undistort_settings import UndistortSettings
 
 START_TIMEOUT_S = 60.0
+SYNTHETIC_ROBOT = {'robot_width_m': 1.2, 'camera_height_m': EYE_HEIGHT_M}
 
 
 def main() -> int:
@@ -42,7 +44,7 @@ def main() -> int:
         common = {**arguments.known.common, 'frame_rate_hz': arguments.rate}
         rig.start_all(arguments.composed, cameras, **common)
         if arguments.view:
-            view(rig, arguments.view)
+            view(rig, arguments.view, SYNTHETIC_ROBOT if arguments.rig in SYNTHETIC_RIGS else {})
             return 0
         with Watcher(domain) as watcher:
             try:
@@ -53,9 +55,9 @@ def main() -> int:
     return 0
 
 
-def view(rig: RigProcesses, host: str) -> None:
+def view(rig: RigProcesses, host: str, robot: dict[str, float]) -> None:
     """Show the panorama in browsers until Ctrl-C."""
-    rig.start('viewer', host=host)
+    rig.start('viewer', host=host, **robot)
     address = wait_for(
         lambda: rig.check_alive() or re.search(r'http://\S+', rig.log('viewer').read_text()),
         START_TIMEOUT_S,

@@ -76,7 +76,7 @@ class ViewerNode(Node):
         super().destroy_node()
 
     def _apply(self, settings: ViewerSettings) -> None:
-        """Tell the pages what the robot is like."""
+        """Send the pages the size of the robot."""
         self._server.tell(
             robot_width_m=settings.robot_width_m, camera_height_m=settings.camera_height_m
         )

@@ -186,6 +186,29 @@ def test_the_page_is_told_what_the_rig_says(ros):
     assert 0 <= told['delay_ms'] < 1000 * DEADLINE_S
 
 
+def test_the_page_is_told_what_the_robot_is_like_also_while_it_looks(ros):
+    node = viewer(ros, port=0, robot_width_m=0.6)
+    ros.start(node)
+
+    async def hear(session):
+        heard = []
+        async with session.ws_connect(f'{node.url}live') as stream:
+            async for message in stream:
+                told = json.loads(message.data)
+                heard.append((told.get('robot_width_m'), told.get('camera_height_m')))
+                if len(heard) == 1:
+                    node.set_parameters([Parameter('camera_height_m', value=0.4)])
+                if heard[-1] == (0.6, 0.4):
+                    return heard
+        return pytest.fail('the stream ended before all was told')
+
+    assert visit(hear)[0] == (0.6, 0.0)
+    for value in (-1.0, 30.0, nan):
+        (answer,) = node.set_parameters([Parameter('robot_width_m', value=value)])
+        assert not answer.successful
+        assert 'robot_width_m' in answer.reason
+
+
 def test_a_negative_stamp_is_a_stamp_too(ros):
     stitching, node = Stitching(ros.context, stamp_of(-1)), viewer(ros, port=0)
     ros.start(stitching, node)

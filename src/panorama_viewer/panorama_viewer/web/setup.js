@@ -14,9 +14,12 @@ export function setup({ screen, sketch, state }) {
       sketch.line(column(projection, edge), SEAM, { width: 1.5, dash: [6, 6] });
     }
   }
-  for (const [i, { name, begin, end }] of fields(overlaps, projection).entries()) {
+  const cameras = fields(overlaps, projection);
+  for (const [i, { name, begin, end }] of cameras.entries()) {
     const color = CAMERAS[i % CAMERAS.length];
-    const y = row(screen, ROOM * (1 + (i % 2)));
+    // Of an odd ring the last one is beside the first: both have the same of two rows.
+    const isThird = i === cameras.length - 1 && i % 2 === 0 && projection.wraps;
+    const y = row(screen, ROOM * (isThird ? 3 : 1 + (i % 2)));
     sketch.line(sampled(begin, end, (x) => projection.ray(x - 0.5, y)), color, { width: 3 });
     for (const edge of [begin, end]) {
       sketch.line(column(projection, edge), color, { width: 1.5, dash: [3, 6] });
