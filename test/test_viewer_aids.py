@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 import test_viewer_browser as viewer
 from selenium.webdriver import Keys
-from test_viewer_browser import CLOSED, MAGENTA, SURFACES, Page, painted, patch
+from test_viewer_browser import CLOSED, MAGENTA, SEAM, SURFACES, Page, painted, patch
 
 from fisheye_geometry.surface import Surface
 
 browser, serve = viewer.browser, viewer.serve  # its fixtures
 
-HEADING, GROUND, SEAM, CAMERA = (132, 220, 61), (77, 216, 255), (216, 79, 255), (255, 200, 94)
+HEADING, GROUND, CAMERA = (132, 220, 61), (77, 216, 255), (255, 200, 94)
 """Blue, green and red of the marks."""
 NEAR = 90
 """Levels by which a thin line differs from its colour between two rows of pixels."""
@@ -262,6 +262,18 @@ def test_keys_switch_the_aids_and_the_page_remembers(browser, serve):
     page.driver.refresh()
     page.press('r')
     assert 'rear' in on(page), 'whatever is remembered'
+
+
+def test_an_aid_that_fails_is_switched_off_and_the_picture_goes_on(browser, serve):
+    page = page_with(browser, serve(SURFACES[0], painted(SURFACES[0], 0, 0)), 'edges')
+    script = "document.querySelector('#rear canvas').getContext = () => null"
+    page.driver.execute_script(script)
+    page.press('r')
+    page.until(lambda: 'Rear view is switched off' in page.text('answer'), 'words')
+    assert on(page) == ['edges']
+    page.press('v')
+    patch(page, 'look', MAGENTA)
+    page.until(lambda: page.text('condition') == 'Live', 'a live picture')
 
 
 def test_a_finger_reaches_every_aid(browser, serve):

@@ -48,6 +48,10 @@ WAVES = 125
 BACKGROUND = 27, 21, 16
 """Of the page, blue, green and red."""
 MAGENTA, GREEN = (255, 0, 255), (0, 255, 0)
+SEAM = (216, 79, 255)
+"""As the page marks it when one sets the rig up."""
+OVERLAP_DEG = 50.0
+"""Of two cameras of 170 degrees, 120 apart."""
 
 
 @pytest.fixture(scope='module')
@@ -497,6 +501,17 @@ def test_one_looks_straight_back_in_a_ring_of_cameras(browser, rig):
     page.look_at(BEHIND_DEG)
     background = abs(page.shot('look')[150:250].astype(int) - BACKGROUND).max(axis=2) < 2
     assert not background.all(axis=0).any(), 'no column is empty'
+    page.press('m')
+    rows = [0]
+
+    def marked():
+        nonlocal rows
+        rows = (abs(page.shot('look').astype(int) - SEAM).max(axis=2) < 40).sum(axis=0)
+        return max(rows) > 100
+
+    page.until(marked, 'the mark of a seam')
+    seam_deg = page.point('look', np.argmax(rows), 50)
+    assert aside_deg(seam_deg, BEHIND_DEG) == pytest.approx(0, abs=OVERLAP_DEG / 2)
 
 
 def test_the_whole_rig_in_a_browser(browser, rig, watcher):

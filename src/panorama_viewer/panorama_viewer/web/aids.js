@@ -86,8 +86,15 @@ export class Aids {
   draw() {
     const { screen, sketch, state } = this;
     sketch.begin((ray) => screen.locate(ray), screen.mode === 'whole');
-    for (const { name, draw } of AIDS) {
-      if (this.on.has(name)) draw?.({ screen, sketch, state });
+    for (const aid of AIDS) {
+      try {
+        if (this.on.has(aid.name)) aid.draw?.({ screen, sketch, state });
+      } catch (error) {
+        // The picture goes on without it.
+        this.on.delete(aid.name);
+        this.show();
+        say(`${aid.words} is switched off: ${error.message}`);
+      }
     }
   }
 }
