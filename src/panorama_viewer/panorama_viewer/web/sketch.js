@@ -15,6 +15,7 @@ export class Sketch {
   begin(locate, wraps) {
     const { pen, canvas } = this;
     this.locate = locate;
+    this.written = []; // places of words: none is written over another
     this.longest = wraps ? canvas.clientWidth / 2 : Infinity;
     this.size = parseFloat(getComputedStyle(canvas).fontSize);
     pen.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
@@ -47,15 +48,18 @@ export class Sketch {
     const place = this.locate(ray);
     if (!place) return;
     const { pen, size } = this;
-    const x = place[0] + { left: size / 2, center: 0, right: -size / 2 }[align];
+    const [x, y] = [place[0] + { left: size / 2, center: 0, right: -size / 2 }[align], place[1]];
+    const isOver = ([left, top]) => Math.abs(x - left) < 3 * size && Math.abs(y - top) < size;
+    if (this.written.some(isOver)) return;
+    this.written.push([x, y]);
     pen.font = `600 ${size}px ${getComputedStyle(this.canvas).fontFamily}`;
     pen.textAlign = align;
     pen.textBaseline = 'middle';
     pen.setLineDash([]);
     pen.strokeStyle = CASING;
     pen.lineWidth = size / 4;
-    pen.strokeText(text, x, place[1]);
+    pen.strokeText(text, x, y);
     pen.fillStyle = color;
-    pen.fillText(text, x, place[1]);
+    pen.fillText(text, x, y);
   }
 }
