@@ -4,9 +4,9 @@ import errno
 from dataclasses import dataclass
 
 import av
-import av.logging
 
 from fisheye_capture.network_request import StreamRequest
+from fisheye_core import ffmpeg_log
 
 _PROTOCOLS = {
     'http': 'http,https,httpproxy,tcp,tls,crypto',
@@ -53,10 +53,8 @@ def open_camera(request: StreamRequest) -> Opened:
         # A transport stream packs a picture in a packet: to look for its end costs another one.
         options |= {'fflags': 'noparse+nofillin', 'fifo_size': '100000', 'overrun_nonfatal': '1'}
     timeout_s = request.connect_timeout_s, max(request.connect_timeout_s, 1.0)
-    av.logging.set_level(av.logging.WARNING)  # That packets got lost is one, each time.
-    av.logging.set_skip_repeated(False)
     try:
-        with av.logging.Capture() as said:
+        with ffmpeg_log.captured() as said:
             container = av.open(request.url, options=options, timeout=timeout_s)
     except (av.error.FFmpegError, OSError, ValueError) as error:
         raise StreamError(refusal(request, error)) from error

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import av
-import av.logging
 
 from fisheye_capture.arrival import ArrivalClock
 from fisheye_capture.network_address import Opened, open_camera, tells_of_loss
 from fisheye_capture.network_request import StreamRequest
+from fisheye_core import ffmpeg_log
 
 _BURST_S = 0.003
 """What comes sooner than that was held up, or read while the stream was looked at."""
@@ -67,7 +67,7 @@ class PacketReader:
         packets = self._container.demux(self._stream)
         while True:
             asked_s = time.monotonic()
-            with av.logging.Capture() as said:
+            with ffmpeg_log.captured() as said:
                 packet = next(packets, None)
             if packet is None or not packet.size:
                 return

@@ -9,10 +9,10 @@ from typing import Any
 
 import av
 
-from fisheye_capture.decoder import Decoder
 from fisheye_capture.network_address import StreamError, open_camera, refusal
 from fisheye_capture.network_request import StreamRequest
 from fisheye_capture.packets import Arrival, packet_reader
+from fisheye_core.picture_decoder import PictureDecoder
 
 _BACKLOG_NS = 300_000_000
 """So far behind, the decoder goes on at the newest keyframe."""
@@ -55,7 +55,7 @@ class StreamCamera:
         stream = opened.container.streams.video[0]
         self._codec = stream.codec_context.name
         self._reader = packet_reader(request, opened)
-        self._decoder = Decoder(stream)
+        self._decoder = PictureDecoder(stream.codec_context)
         self._changed = Condition()
         self._arrivals: deque[Arrival] = deque()
         self._stamps_ns: dict[int | None, int] = {}

@@ -72,6 +72,10 @@ class ImageFormatError(FisheyeError):
     """A picture whose size, encoding or memory layout is not what was expected."""
 
 
+class VideoError(FisheyeError):
+    """Pictures cannot become video here, or not the other way round."""
+
+
 class OverlapError(FisheyeError):
     """The overlap of two views cannot be measured from what was given."""
 

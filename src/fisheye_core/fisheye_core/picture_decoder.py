@@ -6,7 +6,9 @@ import time
 from collections.abc import Iterator
 
 import av
-import av.logging
+from av.video.codeccontext import VideoCodecContext
+
+from fisheye_core import ffmpeg_log
 
 _LOW_DELAY = 1 << 19
 """AV_CODEC_FLAG_LOW_DELAY, which has another name in each PyAV."""
@@ -22,7 +24,7 @@ _RECOVERY_S = 10.0
 """Without further damage; a stream that is refreshed without keyframes is whole after that."""
 
 
-class Decoder:
+class PictureDecoder:
     """Pictures of one stream, each as soon as its last bit is there.
 
     Attributes
@@ -32,16 +34,18 @@ class Decoder:
         came with errors.
     has_begun : bool
         Whether a whole picture came.
+    waits : bool
+        Whether what comes is withheld up to the next keyframe.
     """
 
-    def __init__(self, stream: 'av.video.stream.VideoStream'):
-        context = stream.codec_context
+    def __init__(self, context: VideoCodecContext):
         # Threads that share a picture cost no time; those that take one each delay it by as many.
         context.thread_type = 'SLICE'
         context.thread_count = min(_MAX_THREADS, os.cpu_count() or 1)
         context.flags = int(context.flags) | _LOW_DELAY
+        self._context = context
         self.damaged, self.has_begun = 0, False
-        self._waits, self._damaged_s = True, time.monotonic()
+        self.waits, self._damaged_s = True, time.monotonic()
 
     def decode(
         self, packet: 'av.Packet', *, follows_loss: bool = False
@@ -55,14 +59,14 @@ class Decoder:
         follows_loss
             Whether others before it are missing, which a decoder does not always notice.
         """
-        with av.logging.Capture() as said:
+        with ffmpeg_log.captured() as said:
             try:
-                frames = packet.decode()
+                frames = self._context.decode(packet)
                 is_damaged = follows_loss
             except av.error.FFmpegError:
                 frames, is_damaged = [], True
         is_damaged = is_damaged or any(
-            level <= av.logging.ERROR and _DAMAGE.search(line) for level, _, line in said
+            level <= ffmpeg_log.ERROR and _DAMAGE.search(line) for level, _, line in said
         )
         if is_damaged:
             self.expect_keyframe()
@@ -71,8 +75,8 @@ class Decoder:
             if frame.is_corrupt or is_damaged:
                 self.expect_keyframe()
             elif frame.key_frame or time.monotonic() > self._damaged_s + _RECOVERY_S:
-                self._waits = False
-            if not self._waits:
+                self.waits = False
+            if not self.waits:
                 self.has_begun = True
                 yield frame
             else:
@@ -80,4 +84,4 @@ class Decoder:
 
     def expect_keyframe(self) -> None:
         """Withhold frames until the next keyframe: those between would be drawn upon a gap."""
-        self._waits, self._damaged_s = True, time.monotonic()
+        self.waits, self._damaged_s = True, time.monotonic()

@@ -6,7 +6,7 @@ import av
 import numpy as np
 import pytest
 
-from fisheye_capture.decoder import Decoder
+from fisheye_core.picture_decoder import PictureDecoder
 
 GOP = 10
 TICK = Fraction(1, 30)
@@ -37,7 +37,7 @@ def decoded(path, harm=lambda n, data: data):
     numbers = []
     with av.open(str(path)) as container:
         stream = container.streams.video[0]
-        decoder, is_lost = Decoder(stream), False
+        decoder, is_lost = PictureDecoder(stream.codec_context), False
         for n, packet in enumerate(container.demux(stream)):
             data = harm(n, bytes(packet))
             if data:

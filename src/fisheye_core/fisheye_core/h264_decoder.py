@@ -1,0 +1,71 @@
+"""H.264 to pictures without delay, and without showing what arrived damaged."""
+
+import av
+import numpy as np
+
+from fisheye_core.encodings import from_opencv
+from fisheye_core.h264_encoder import MAX_MACROBLOCKS
+from fisheye_core.nal_units import is_keyframe
+from fisheye_core.picture_decoder import PictureDecoder
+
+_MAX_PIXELS = MAX_MACROBLOCKS * 256
+"""A few bytes can claim to be more than fits into memory."""
+
+
+class H264Decoder:
+    """Decodes the pictures of one stream; what is drawn upon a gap is dropped.
+
+    Attributes
+    ----------
+    damaged : int
+        Pictures that were dropped since the first whole one.
+    """
+
+    def __init__(self) -> None:
+        self.damaged = 0
+        self._pictures = _fresh()
+
+    @property
+    def wants_keyframe(self) -> bool:
+        """Whether nothing can be shown before the next keyframe."""
+        return self._pictures.waits
+
+    def decode(self, data: bytes, encoding: str = 'bgr8') -> np.ndarray | None:
+        """Decode a message; whatever it holds, this only ever returns.
+
+        Parameters
+        ----------
+        data
+            The bytes of one picture, annex B.
+        encoding
+            Of the result, one of `fisheye_core.encodings.CHANNELS`.
+
+        Returns
+        -------
+        ndarray or None
+            (height, width[, 3]) uint8, the newest picture; None if there is none that is whole.
+        """
+        pictures = self._pictures
+        if pictures.waits:
+            if not is_keyframe(data):
+                self.damaged += pictures.has_begun
+                return None
+            # What came before a keyframe, whole or not, has no part in it.
+            self._pictures = _fresh()
+            self._pictures.has_begun = pictures.has_begun
+            pictures = self._pictures
+        before = pictures.damaged
+        frames = list(pictures.decode(av.Packet(data)))
+        self.damaged += pictures.damaged - before
+        if not frames:
+            pictures.expect_keyframe()
+            return None
+        grey = encoding == 'mono8'
+        return from_opencv(frames[-1].to_ndarray(format='gray' if grey else 'bgr24'), encoding)
+
+
+def _fresh() -> PictureDecoder:
+    context = av.CodecContext.create('h264', 'r')
+    context.options = {'max_pixels': f'{_MAX_PIXELS}'}
+    context.thread_count = 1
+    return PictureDecoder(context)
