@@ -10,6 +10,9 @@ IMAGE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 IMAGE_INPUT = QoSProfile(depth=3, reliability=ReliabilityPolicy.RELIABLE)
 """Images as they are taken: a moment without the processor loses none."""
 
+VIDEO = QoSProfile(depth=5, reliability=ReliabilityPolicy.RELIABLE)
+"""Video: each picture is drawn upon those before, so a few may be sent again, but none late."""
+
 BEST_EFFORT_INPUT = QoSProfile(depth=3, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Where the publisher is not ours: this meets a reliable one and a best-effort one."""
 

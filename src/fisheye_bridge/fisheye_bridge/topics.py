@@ -1,17 +1,20 @@
 """Image topics: the raw picture and beside it the JPEG that image_transport would publish."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
+from rclpy.qos import QoSProfile
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
 from fisheye_bridge.diagnostics import DropCounter
 from fisheye_bridge.images import ImageBuffer, from_jpeg, jpeg_message, to_array, to_jpeg
-from fisheye_bridge.qos import ADJUSTABLE, BEST_EFFORT_INPUT, IMAGE, IMAGE_INPUT
+from fisheye_bridge.qos import ADJUSTABLE, BEST_EFFORT_INPUT, IMAGE, IMAGE_INPUT, VIDEO
+from fisheye_bridge.video_input import VideoInput
 from fisheye_core.errors import FisheyeError
 
 
@@ -76,6 +79,28 @@ class ImagePublisher:
             self._jpeg.publish(message)
 
 
+@dataclass(frozen=True)
+class _Transport:
+    """How images travel: what carries them, on which sub-topic, and what makes arrays of it."""
+
+    kind: type
+    sub_topic: str
+    qos: QoSProfile
+    converter: Callable[[Node, str], Callable[..., tuple[np.ndarray, str] | None]]
+
+
+_TRANSPORTS = {
+    'raw': _Transport(Image, '', IMAGE_INPUT, lambda *_: to_array),
+    'compressed': _Transport(CompressedImage, '/compressed', IMAGE_INPUT, lambda *_: from_jpeg),
+    'video': _Transport(
+        CompressedImage,
+        '/video/compressed',
+        VIDEO,
+        lambda node, topic: VideoInput(node, f'{topic}/video'),
+    ),
+}
+
+
 class ImageSubscription:
     """Hands over the pictures of a topic as arrays, and keeps what is broken away.
 
@@ -106,18 +131,23 @@ class ImageSubscription:
             Called with (height, width[, 3]) uint8, its encoding and the header. A `FisheyeError`
             that it raises drops the picture with a warning.
         transport
-            'raw', or 'compressed' for the JPEG sub-topic.
+            'raw', or 'compressed' or 'video' for that sub-topic.
         key
             Of the number of dropped pictures in the report.
+
+        Raises
+        ------
+        VideoError
+            If video is not possible here.
         """
         self._node = node
         self._callback = callback
-        jpeg = transport == 'compressed'
-        self._kind, self._convert = (CompressedImage, from_jpeg) if jpeg else (Image, to_array)
-        self._topic = f'{topic}/compressed' if jpeg else topic
+        way = _TRANSPORTS[transport]
+        self._kind, self._convert = way.kind, way.converter(node, topic)
+        self._topic = topic + way.sub_topic
         self.dropped = DropCounter(node, f'a picture on {self._topic}', key)
         self._subscribe(
-            IMAGE_INPUT,
+            way.qos,
             event_callbacks=SubscriptionEventCallbacks(incompatible_qos=self._make_do),
             qos_overriding_options=ADJUSTABLE,
         )
@@ -137,7 +167,7 @@ class ImageSubscription:
 
     def _take(self, message) -> None:
         try:
-            image, encoding = self._convert(message)
-            self._callback(image, encoding, message.header)
+            if converted := self._convert(message):
+                self._callback(*converted, message.header)
         except FisheyeError as error:
             self.dropped.add(error)

@@ -12,6 +12,7 @@ from fisheye_bridge.qos import IMAGE
 from fisheye_bridge.running import run
 from fisheye_bridge.stamps import stamp_of
 from fisheye_bridge.topics import ImagePublisher
+from fisheye_bridge.video_publisher import VideoPublisher
 from fisheye_capture.calibration_url import calibration_path
 from fisheye_capture.capture_settings import CaptureSettings
 from fisheye_capture.grabber import Grabber
@@ -38,6 +39,7 @@ class CaptureNode(Node):
         )
         self._region = region_named(self._settings.region)
         self._image = ImagePublisher(self, 'image_raw')
+        self._video = VideoPublisher(self, 'image_raw', 'image_raw/video')
         self._camera_info = self.create_publisher(CameraInfo, 'camera_info', IMAGE)
         self._info, self._described, self._fault = CameraInfo(), None, ''
         self._broken = DropCounter(self, 'a picture', 'pictures broken')
@@ -53,6 +55,7 @@ class CaptureNode(Node):
         """Release the camera and end the threads too."""
         self._grabber.stop()
         self._publishing.stop()
+        self._video.stop()
         super().destroy_node()
 
     def _calibration(self) -> Camera | None:
@@ -74,6 +77,8 @@ class CaptureNode(Node):
             if self._described != (self._camera, *shown.size):
                 self._describe(self._camera, *shown.size)
             self._image.publish_picture(shown, settings.encoding, header, settings.jpeg_quality)
+            if self._video.wanted:
+                self._video.put(shown.image, settings.encoding, header, settings)
         except FisheyeError as error:
             self._broken.add(error)
             return
@@ -133,6 +138,7 @@ class CaptureNode(Node):
         report.values['pictures skipped'] = skipped
         report.values['pictures damaged'] = grabber.damaged
         self._broken.tell(report)
+        self._video.report(report)
 
 
 def main() -> int:

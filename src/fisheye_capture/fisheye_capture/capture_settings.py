@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from math import isnan, nan
 
 from fisheye_core.settings import setting
+from fisheye_core.video_settings import VideoSettings
 from fisheye_geometry.lens import MAX_PICTURE_SIDE_PX
 
 
@@ -147,7 +148,7 @@ _USUAL_YAW_DEG = {'left': -70.0, 'right': 70.0}
 
 
 @dataclass(frozen=True)
-class CaptureSettings(CameraSettings, FrameSettings):
+class CaptureSettings(CameraSettings, FrameSettings, VideoSettings):
     """Settings of the capture node."""
 
     jpeg_quality: int = setting(

@@ -1,5 +1,7 @@
 """H.264 to pictures without delay, and without showing what arrived damaged."""
 
+import time
+
 import av
 import numpy as np
 
@@ -7,9 +9,12 @@ from fisheye_core.encodings import from_opencv
 from fisheye_core.h264_encoder import MAX_MACROBLOCKS
 from fisheye_core.nal_units import is_keyframe
 from fisheye_core.picture_decoder import PictureDecoder
+from fisheye_core.picture_numbers import PictureNumbers
 
 _MAX_PIXELS = MAX_MACROBLOCKS * 256
 """A few bytes can claim to be more than fits into memory."""
+_PAUSE_S = 0.5
+"""After it, so many pictures may be missing that their numbers are what they were."""
 
 
 class H264Decoder:
@@ -23,14 +28,17 @@ class H264Decoder:
 
     def __init__(self) -> None:
         self.damaged = 0
-        self._pictures = _fresh()
+        self._pictures, self._numbers = _fresh(), PictureNumbers()
+        self._came_s = 0.0
 
     @property
     def wants_keyframe(self) -> bool:
         """Whether nothing can be shown before the next keyframe."""
         return self._pictures.waits
 
-    def decode(self, data: bytes, encoding: str = 'bgr8') -> np.ndarray | None:
+    def decode(
+        self, data: bytes, encoding: str = 'bgr8', now_s: float | None = None
+    ) -> np.ndarray | None:
         """Decode a message; whatever it holds, this only ever returns.
 
         Parameters
@@ -39,21 +47,27 @@ class H264Decoder:
             The bytes of one picture, annex B.
         encoding
             Of the result, one of `fisheye_core.encodings.CHANNELS`.
+        now_s
+            When it came, on a steady clock; None: now.
 
         Returns
         -------
         ndarray or None
             (height, width[, 3]) uint8, the newest picture; None if there is none that is whole.
         """
-        pictures = self._pictures
-        if pictures.waits:
+        now_s = time.monotonic() if now_s is None else now_s
+        is_late, self._came_s = now_s - self._came_s > _PAUSE_S, now_s
+        if self._numbers.has_gap(data) or is_late:
+            self._pictures.expect_keyframe()
+        has_begun = self._pictures.has_begun
+        if self._pictures.waits:
             if not is_keyframe(data):
-                self.damaged += pictures.has_begun
+                self.damaged += has_begun
                 return None
             # What came before a keyframe, whole or not, has no part in it.
             self._pictures = _fresh()
-            self._pictures.has_begun = pictures.has_begun
-            pictures = self._pictures
+            self._pictures.has_begun = has_begun
+        pictures = self._pictures
         before = pictures.damaged
         frames = list(pictures.decode(av.Packet(data)))
         self.damaged += pictures.damaged - before

@@ -6,7 +6,7 @@ _START = b'\x00\x00\x01'
 _SLICE_OF_KEYFRAME, _SEQUENCE_PARAMETERS, _PICTURE_PARAMETERS = 5, 7, 8
 
 
-def _units(data: bytes) -> Iterator[tuple[int, int, int]]:
+def units(data: bytes) -> Iterator[tuple[int, int, int]]:
     """Yield the type of each unit and where it begins and ends, with its start code."""
     at = data.find(_START)
     while 0 <= at < len(data) - len(_START):
@@ -17,10 +17,10 @@ def _units(data: bytes) -> Iterator[tuple[int, int, int]]:
 
 def is_keyframe(data: bytes) -> bool:
     """Whether a picture can be decoded without any before it (an IDR picture)."""
-    return any(kind == _SLICE_OF_KEYFRAME for kind, _, _ in _units(data))
+    return any(kind == _SLICE_OF_KEYFRAME for kind, _, _ in units(data))
 
 
 def parameter_sets(data: bytes) -> bytes:
     """Return the parameter sets of a picture, each with its start code; empty without any."""
     kinds = _SEQUENCE_PARAMETERS, _PICTURE_PARAMETERS
-    return b''.join(data[begin:end] for kind, begin, end in _units(data) if kind in kinds)
+    return b''.join(data[begin:end] for kind, begin, end in units(data) if kind in kinds)

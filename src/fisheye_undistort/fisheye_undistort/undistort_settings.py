@@ -43,7 +43,9 @@ class SurfaceSettings:
         live=True,
     )
     transport: str = setting(
-        'raw', 'How pictures of topics are taken: raw, or as JPEG.', choices=('raw', 'compressed')
+        'raw',
+        'How pictures of topics are taken: raw, as JPEG (compressed), or as H.264 (video).',
+        choices=('raw', 'compressed', 'video'),
     )
 
     def surface_of(self, lens: Lens) -> Surface:

@@ -21,7 +21,7 @@ ARGUMENTS = {
     'robot': ('false', 'only the captures, on the robot'),
     'base': ('false', 'all but the captures, at the other end of the link'),
     'params_file': (str(CONFIG / 'panorama.yaml'), 'parameters that differ from the defaults'),
-    'transport': ('', 'how pictures are taken from topics: raw or compressed'),
+    'transport': ('', 'how pictures are taken from topics: raw, compressed or video'),
     'frame_rate_hz': ('', 'frames a second of each camera'),
     'overlap_file': ('', 'where the overlap is read at start and saved on request'),
     'view': ('false', 'also show the panorama in a browser'),

@@ -1,6 +1,5 @@
 """What stitch_node and panorama_node share: parameters, service, and the published panorama."""
 
-from collections import deque
 from collections.abc import Iterator
 from threading import Thread
 from time import monotonic
@@ -10,7 +9,6 @@ from fisheye_msgs.srv import CalibrateOverlap
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 from sensor_msgs.msg import Imu
-from std_msgs.msg import Header
 
 from fisheye_bridge.awaiting import awaitable
 from fisheye_bridge.diagnostics import (
@@ -21,21 +19,21 @@ from fisheye_bridge.diagnostics import (
     OverloadMonitor,
     Report,
 )
-from fisheye_bridge.images import ImageBuffer
 from fisheye_bridge.imu import gravity_of
 from fisheye_bridge.parameters import Parameters
 from fisheye_bridge.projection import projection_of
 from fisheye_bridge.qos import BEST_EFFORT_INPUT, LATCHED
-from fisheye_bridge.stamps import stamp_of
-from fisheye_bridge.topics import ImagePublisher
 from fisheye_core.errors import FisheyeError, SettingError
-from fisheye_core.rate_meter import RateMeter
 from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.nodes.overlap_message import overlap_messages
+from panorama_stitch.nodes.panorama_publisher import (
+    FRAME_ID,
+    PanoramaPublisher,
+    header_of,
+)
 from panorama_stitch.overlap.overlap_settings import METHODS
 from panorama_stitch.pipeline.metrics import (
     economy_sentence,
-    latency_metrics,
     metrics,
     unpaired_sentence,
 )
@@ -43,8 +41,6 @@ from panorama_stitch.pipeline.panorama import Panorama
 from panorama_stitch.pipeline.panorama_settings import MountSettings, PanoramaOutputSettings
 from panorama_stitch.pipeline.stitch_pipeline import StitchPipeline
 
-FRAME_ID = 'panorama_optical_frame'
-_LATENCIES = 300
 _ANSWER_S = 10.0
 """Nobody waits longer for the answer of a service; what was asked for is done nevertheless."""
 _SILENT_IMU_S = 2.0
@@ -61,12 +57,10 @@ class PanoramaBase(Node):
             for camera in declared.settings.cameras
         ]
         self.pipeline = StitchPipeline(declared.settings, mounts)
-        self._buffer: ImageBuffer | None = None
         self._announced: Compositor | None = None
-        self._handled, self._published, self._rate = 0, 0, RateMeter()
+        self._handled = 0
         self._overload = OverloadMonitor('pairs')
-        self._latencies_ms: deque[float] = deque(maxlen=_LATENCIES)
-        self._image = ImagePublisher(self, 'panorama/image')
+        self._panorama = PanoramaPublisher(self)
         self._projection = self.create_publisher(Projection, 'panorama/projection', LATCHED)
         self._overlaps = self.create_publisher(Overlaps, 'panorama/overlap', LATCHED)
         # A group of its own: while an answer is awaited, rclpy runs nothing else of its group.
@@ -95,6 +89,7 @@ class PanoramaBase(Node):
         """End the threads too."""
         self.pipeline.stop()
         self._thread.join()
+        self._panorama.stop()
         super().destroy_node()
 
     def warn(self, sentence: str) -> None:
@@ -117,27 +112,13 @@ class PanoramaBase(Node):
             if panorama.compositor is not self._announced:
                 self._announce(panorama)
             self._handled += 1
-            if self._image.wanted:
-                self._publish(panorama)
+            self._panorama.publish(panorama, self.settings)
             self.pipeline.leave_room(monotonic() - begin_s)
-
-    def _publish(self, panorama: Panorama) -> None:
-        surface = panorama.surface
-        size = surface.width, surface.height, panorama.encoding
-        if self._buffer is None or not self._buffer.fits(*size):
-            self._buffer = ImageBuffer(*size)
-        panorama.draw(self._buffer.array)
-        self._buffer.message.header = _header(panorama.stamp_ns)
-        self._image.publish(self._buffer.message, self._buffer.array, self.settings.jpeg_quality)
-        self._published += 1
-        self._rate.count()
-        age_ns = self.get_clock().now().nanoseconds - panorama.stamp_ns
-        self._latencies_ms.append(age_ns / 1e6)
 
     def _announce(self, panorama: Panorama) -> None:
         """Publish what is in use from this panorama on, for those who come later too."""
         self._announced = panorama.compositor
-        header = _header(panorama.stamp_ns)
+        header = header_of(panorama.stamp_ns)
         layout, rig = panorama.compositor.layout, self.pipeline.rig
         self._projection.publish(projection_of(panorama.surface, header, wraps=layout.wraps))
         overlaps = overlap_messages(self.pipeline.overlaps, rig, FRAME_ID, layout)
@@ -185,10 +166,8 @@ class PanoramaBase(Node):
         if not ages_s:
             # Frames without a partner are not shed: what they lack is another camera's.
             self._overload.tell(report, self._handled, pipeline.frames.overtaken)
-        report.values['rate Hz'] = self._rate.hz
-        report.values['panoramas published'] = self._published
         report.values.update(metrics(pipeline))
-        report.values.update(latency_metrics(self._latencies_ms))
+        self._panorama.report(report)
 
     def _rig_faults(self) -> Iterator[str]:
         """Return what is wrong with the rig, in sentences."""
@@ -203,7 +182,3 @@ class PanoramaBase(Node):
         elif self.settings.level == 'imu' and monotonic() - self._imu_s > _SILENT_IMU_S:
             silent_s = monotonic() - self._imu_s
             yield f'nothing came on the topic imu for {silent_s:.0f} s; the last level is held'
-
-
-def _header(stamp_ns: int) -> Header:
-    return Header(stamp=stamp_of(stamp_ns), frame_id=FRAME_ID)

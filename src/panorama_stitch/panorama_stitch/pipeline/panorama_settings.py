@@ -6,6 +6,7 @@ from math import isnan, nan, radians
 from fisheye_capture.capture_settings import FrameSettings
 from fisheye_core.errors import SettingError
 from fisheye_core.settings import setting
+from fisheye_core.video_settings import VideoSettings
 from fisheye_geometry.level import LEVELS, Mount
 from fisheye_geometry.rig import CAMERA_NAME, MAX_CAMERAS, RINGS
 from fisheye_undistort.undistort_settings import SurfaceSettings
@@ -17,7 +18,7 @@ from panorama_stitch.overlap.overlap_settings import OverlapSettings
 
 
 @dataclass(frozen=True)
-class PanoramaOutputSettings(OverlapSettings):
+class PanoramaOutputSettings(OverlapSettings, VideoSettings):
     """What both nodes that make panoramas can be told; all that the stitch node can."""
 
     cameras: tuple[str, ...] = setting(

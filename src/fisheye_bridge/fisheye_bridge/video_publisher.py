@@ -1,0 +1,209 @@
+"""Pictures as video, encoded while anybody subscribes, in every message type that is installed."""
+
+import importlib
+from array import array
+from collections.abc import Callable
+from dataclasses import dataclass
+from threading import Event
+from time import monotonic
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.node import Node
+from std_msgs.msg import Empty, Header
+
+from fisheye_bridge.diagnostics import WARN, Report
+from fisheye_bridge.qos import VIDEO
+from fisheye_bridge.stamps import ns_of
+from fisheye_core.errors import FisheyeError
+from fisheye_core.latest_only import LatestOnlyWorker
+from fisheye_core.rate_meter import RateMeter
+from fisheye_core.video import video_encoder
+from fisheye_core.video_settings import VideoSettings
+
+if TYPE_CHECKING:
+    from fisheye_core.h264_encoder import EncodedPicture, H264Encoder
+
+_ANSWER_S = 0.3
+"""Who asks for a keyframe sooner after one has not seen it yet."""
+_REPORT_S = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Picture:
+    """What waits to be encoded: (height, width[, 3]) uint8 in an encoding."""
+
+    image: np.ndarray
+    encoding: str
+    header: Header
+    settings: VideoSettings
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """A type of message: where it is defined, on which topic, and its fields beside the data."""
+
+    module: str
+    name: str
+    topic: str
+    fields: Callable[['EncodedPicture', _Picture], dict[str, Any]]
+
+
+_KINDS = (
+    _Kind(
+        'sensor_msgs.msg',
+        'CompressedImage',
+        '{video}/compressed',
+        lambda encoded, picture: {
+            'header': picture.header,
+            'format': picture.settings.video_codec,
+        },
+    ),
+    _Kind(
+        'foxglove_msgs.msg',
+        'CompressedVideo',
+        '{video}',
+        lambda encoded, picture: {
+            'timestamp': picture.header.stamp,
+            'frame_id': picture.header.frame_id,
+            'format': picture.settings.video_codec,
+        },
+    ),
+    _Kind(
+        'ffmpeg_image_transport_msgs.msg',
+        'FFMPEGPacket',
+        '{image}/ffmpeg',
+        lambda encoded, picture: {
+            'header': picture.header,
+            'width': picture.image.shape[1],
+            'height': picture.image.shape[0],
+            'encoding': f'{picture.settings.video_codec};yuv420p;bgr8;{picture.encoding}',
+            'pts': ns_of(picture.header.stamp),
+            'flags': int(encoded.is_keyframe),  # AV_PKT_FLAG_KEY
+        },
+    ),
+)
+"""Only the first is always there; the packages of the others are not among our dependencies."""
+
+
+class VideoPublisher:
+    """Publishes pictures as video while anybody subscribes, encoded in a thread of its own."""
+
+    def __init__(self, node: Node, image: str, video: str):
+        """Advertise the topics that belong to the pictures on the topic `image`."""
+        self._node, self._video = node, video
+        self._encoder: H264Encoder | None = None
+        self._fault, self._keyframe_s = '', 0.0
+        self._is_keyframe_wanted = Event()
+        self._rate, self._encoding_ms, self._bytes = RateMeter(), 0.0, 0
+        self._reported = 0, monotonic()
+        joined = PublisherEventCallbacks(matched=self._welcome)
+        self._publishers = [
+            (
+                kind,
+                kind_class,
+                node.create_publisher(
+                    kind_class,
+                    kind.topic.format(image=image, video=video),
+                    VIDEO,
+                    event_callbacks=joined,
+                ),
+            )
+            for kind in _KINDS
+            if (kind_class := _class_of(kind))
+        ]
+        node.create_subscription(Empty, f'{video}/keyframe', self._take_request, VIDEO)
+        self._worker = LatestOnlyWorker(self._publish, 'video')
+
+    @property
+    def wanted(self) -> bool:
+        """Whether anybody subscribes."""
+        return any(publisher.get_subscription_count() for *_, publisher in self._publishers)
+
+    def put(
+        self, image: np.ndarray, encoding: str, header: Header, settings: VideoSettings
+    ) -> None:
+        """Have a copy of a picture encoded, in place of one that still waits.
+
+        Parameters
+        ----------
+        image
+            (height, width[, 3]) uint8.
+        encoding
+            One of `fisheye_core.encodings.CHANNELS`.
+        header
+            Of the messages.
+        settings
+            Those of now.
+        """
+        self._worker.put(_Picture(image.copy(), encoding, header, settings))
+
+    def stop(self) -> None:
+        """End the thread."""
+        self._worker.stop()
+
+    def report(self, report: Report) -> None:
+        """Report what is wrong with the encoder, and while anybody subscribes its numbers."""
+        if not self.wanted:
+            return
+        if self._fault:
+            report.add(WARN, f'{self._video}: {self._fault}')
+        (former, former_s), now_s = self._reported, monotonic()
+        self._reported = self._bytes, now_s
+        kbits = 8e-3 * (self._bytes - former)
+        report.values['video encoder'] = self._encoder.name if self._encoder else 'none'
+        report.values['video rate Hz'] = self._rate.hz
+        report.values['video kbit/s'] = kbits / max(now_s - former_s, _REPORT_S / 2)
+        report.values['video encoding ms'] = self._encoding_ms
+        report.values['video pictures skipped'] = self._worker.dropped
+
+    def _welcome(self, change) -> None:
+        if change.current_count_change > 0:
+            self._is_keyframe_wanted.set()
+
+    def _take_request(self, _: Empty) -> None:
+        if monotonic() - self._keyframe_s > _ANSWER_S:
+            self._is_keyframe_wanted.set()
+
+    def _publish(self, picture: _Picture) -> None:
+        begin_s = monotonic()
+        try:
+            encoded = self._encoded(picture)
+        except FisheyeError as error:
+            self._tell(str(error))
+            return
+        self._encoding_ms = 1e3 * (monotonic() - begin_s)
+        self._rate.count()
+        self._bytes += len(encoded.data)
+        data = array('B')
+        data.frombytes(encoded.data)
+        for kind, kind_class, publisher in self._publishers:
+            if publisher.get_subscription_count():
+                publisher.publish(kind_class(data=data, **kind.fields(encoded, picture)))
+
+    def _encoded(self, picture: _Picture) -> 'EncodedPicture':
+        settings = picture.settings
+        encoder = self._encoder = self._encoder or video_encoder(settings)
+        encoder.bitrate_kbps = settings.video_bitrate_kbps
+        encoder.keyframe_s = settings.video_keyframe_s
+        if self._is_keyframe_wanted.is_set():
+            self._is_keyframe_wanted.clear()
+            encoder.request_keyframe()
+        encoded = encoder.encode(picture.image, picture.encoding)
+        if encoded.is_keyframe:
+            self._keyframe_s = monotonic()
+        self._tell(encoder.note)
+        return encoded
+
+    def _tell(self, fault: str) -> None:
+        if fault and fault != self._fault:
+            self._node.get_logger().warning(f'{self._video}: {fault}')
+        self._fault = fault
+
+
+def _class_of(kind: _Kind) -> type | None:
+    try:
+        return getattr(importlib.import_module(kind.module), kind.name)
+    except ImportError:
+        return None
