@@ -113,8 +113,11 @@ class H264Encoder:
             if picture := self._encoded(planes, self._context):
                 return picture
         # Hardware may fail at any time; without it the stream goes on.
-        self._candidates = [name for name in self._candidates if name != self.name] or ['libx264']
-        return self._begin(planes)
+        fault = f'{self.name} stopped working'
+        self._candidates = self._candidates[1:] or list(ENCODERS[-1:])
+        picture = self._begin(planes)
+        self.note = f'{fault}; {self.name} encodes in its place'
+        return picture
 
     def _begin(self, planes: np.ndarray) -> EncodedPicture:
         """Open the first encoder that makes one packet of the picture at once."""

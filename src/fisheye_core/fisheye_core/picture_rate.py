@@ -2,10 +2,10 @@
 
 from collections import deque
 
-_PICTURES = 11
-_LATEST = 5
-"""After a change the rate is that of so many pictures."""
+_PICTURES, _FEW = 11, 5
 _FASTER, _SLOWER = 1.15, 0.6
+_MUCH_FASTER = 1.6
+"""Of few pictures: a jump is followed before much was sent at the old share."""
 _PAUSE_S = 1.0
 """After a pause, counting begins anew."""
 
@@ -24,17 +24,19 @@ class PictureRate:
         self._times_s: deque[float] = deque(maxlen=_PICTURES)
 
     def changed(self, now_s: float) -> bool:
-        """Count a picture; return whether the nominal rate is another one now."""
+        """Count a picture that comes at a time; return whether the nominal rate is now another."""
         times_s = self._times_s
         if times_s and not 0 < now_s - times_s[-1] < _PAUSE_S:
             times_s.clear()
         times_s.append(now_s)
-        if len(times_s) < _PICTURES:
+        if len(times_s) < _FEW:
             return False
-        hz = (_PICTURES - 1) / (now_s - times_s[0])
-        if _SLOWER * self.hz < hz < _FASTER * self.hz:
+        few_hz = (_FEW - 1) / (now_s - times_s[-_FEW])
+        hz = (len(times_s) - 1) / (now_s - times_s[0])
+        is_known = len(times_s) == _PICTURES
+        is_faster = few_hz > _MUCH_FASTER * self.hz or (is_known and hz > _FASTER * self.hz)
+        if not is_faster and not (is_known and hz < _SLOWER * self.hz):
             return False
-        latest_hz = (_LATEST - 1) / (now_s - times_s[-_LATEST])
-        self.hz = max(hz, latest_hz)
+        self.hz = max(hz, few_hz)
         times_s.clear()
         return True
