@@ -1,0 +1,177 @@
+"""Video between two nodes: only while it is wanted, from the first moment on, and mended."""
+
+from array import array
+
+import cv2
+import numpy as np
+import pytest
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from sensor_msgs.msg import CompressedImage
+from std_msgs.msg import Header
+
+from fisheye_bridge import video_publisher
+from fisheye_bridge.diagnostics import WARN, Report
+from fisheye_bridge.qos import VIDEO
+from fisheye_bridge.stamps import ns_of, stamp_of
+from fisheye_bridge.topics import ImageSubscription
+from fisheye_bridge.video_publisher import VideoPublisher
+from fisheye_core.errors import VideoError
+from fisheye_core.nal_units import is_keyframe
+from fisheye_core.video_settings import VideoSettings
+from fisheye_testing.waiting import PATIENCE_S, wait_for
+
+SETTINGS = VideoSettings(video_keyframe_s=60.0, video_encoder='libx264')
+"""No keyframe comes by itself."""
+SIZE = 160, 120
+SOON = 5
+"""Pictures: what passes until a new subscriber and the publisher have found each other."""
+CLOSE = 6.0
+
+
+class Link:
+    """A publisher of video and who else is there, spun by `step`."""
+
+    def __init__(self):
+        self._context = rclpy.Context()
+        rclpy.init(context=self._context)
+        self.robot, self.base = (
+            rclpy.create_node(name, context=self._context, use_global_arguments=False)
+            for name in ('robot', 'base')
+        )
+        self._executor = SingleThreadedExecutor(context=self._context)
+        for node in (self.robot, self.base):
+            self._executor.add_node(node)
+        self.video = VideoPublisher(self.robot, 'image_raw', 'image_raw/video')
+        self.sent = 0
+
+    def stop(self):
+        self.video.stop()
+        for node in (self.robot, self.base):
+            node.destroy_node()
+        self._executor.shutdown()
+        rclpy.shutdown(context=self._context)
+
+    def subscribe(self, take):
+        """Take the messages as they are."""
+        return self.base.create_subscription(
+            CompressedImage, 'image_raw/video/compressed', take, VIDEO
+        )
+
+    def step(self, settings=SETTINGS):
+        """Publish a picture whose grey is its number, and let come what comes."""
+        grey = np.full((SIZE[1], SIZE[0], 3), 30 + self.sent % 200, np.uint8)
+        self.sent += 1
+        self.video.put(grey, 'bgr8', Header(stamp=stamp_of(self.sent)), settings)
+        self._executor.spin_once(0.02)
+        return True
+
+    def until(self, condition, what):
+        wait_for(lambda: self.step() and condition(), PATIENCE_S, what)
+
+    def report(self):
+        report = Report()
+        self.video.report(report)
+        return report
+
+
+@pytest.fixture
+def link():
+    link = Link()
+    yield link
+    link.stop()
+
+
+def test_it_is_wanted_while_somebody_subscribes(link):
+    assert not link.video.wanted
+    subscription = link.subscribe(lambda message: None)
+    wait_for(lambda: link.video.wanted, what='a subscriber')
+    link.base.destroy_subscription(subscription)
+    wait_for(lambda: not link.video.wanted, what='the end of the subscription')
+    assert link.report().values == {}
+
+
+def test_who_joins_gets_a_keyframe_though_none_was_due(link):
+    first, later = [], []
+    link.subscribe(first.append)
+    link.until(lambda: len(first) > 10, 'video')
+    link.subscribe(later.append)
+    link.until(lambda: len(later) > SOON, 'video for the other')
+    for messages in (first, later):
+        assert any(is_keyframe(bytes(m.data)) for m in messages[:SOON])
+    assert not any(is_keyframe(bytes(m.data)) for m in first[SOON:10])
+    assert {m.format for m in first} == {'h264'}
+
+
+def test_pictures_come_out_with_the_stamp_that_they_went_in_with(link):
+    pictures = []
+    ImageSubscription(
+        link.base,
+        'image_raw',
+        lambda image, encoding, header: pictures.append((image, encoding, ns_of(header.stamp))),
+        transport='video',
+    )
+    link.until(lambda: len(pictures) > 20, 'pictures')
+    for image, encoding, stamp_ns in pictures:
+        assert encoding == 'bgr8'
+        assert image.shape == (SIZE[1], SIZE[0], 3)
+        assert abs(image.mean() - (29 + stamp_ns % 200)) < CLOSE
+    values = link.report().values
+    assert values['video encoder'] == 'libx264'
+    assert values['video kbit/s'] > 0
+
+
+def test_a_gap_is_told_and_mended_by_a_keyframe_that_is_asked_for(link):
+    """What comes from somewhere else breaks the stream: here it stands for a loss on the way."""
+    pictures = []
+    base = ImageSubscription(
+        link.base, 'image_raw', lambda *picture: pictures.append(picture), transport='video'
+    )
+    intruder = link.robot.create_publisher(CompressedImage, 'image_raw/video/compressed', VIDEO)
+    link.until(lambda: len(pictures) > 5, 'pictures')
+    intruder.publish(CompressedImage(format='h264', data=array('B', b'\0\0\1\x41broken')))
+    link.until(lambda: base.dropped.count, 'the loss')
+    report = Report()
+    base.dropped.tell(report)
+    assert report.level == WARN
+    assert 'expected is a keyframe now, which is asked for' in report.reasons[0]
+    before = len(pictures)
+    link.until(lambda: len(pictures) > before + 5, 'pictures again')
+
+
+def test_a_slow_encoder_drops_pictures_and_keeps_nobody_waiting(link):
+    came = []
+    link.subscribe(came.append)
+    wait_for(lambda: link.video.wanted, what='a subscriber')
+    large = np.random.default_rng(1).integers(0, 255, (2000, 3000, 3), np.uint8)
+    count = 12
+    for number in range(count):
+        link.video.put(large, 'bgr8', Header(stamp=stamp_of(1 + number)), SETTINGS)
+    link.until(lambda: came and ns_of(came[-1].header.stamp) > 0, 'the end of the encoding')
+    assert link.report().values['video pictures skipped'] >= count - 3
+
+
+def test_a_fault_of_the_encoder_is_told_and_harms_nothing_else(link, monkeypatch):
+    def fail(settings):
+        raise VideoError('video needs PyAV, which is missing here')
+
+    monkeypatch.setattr(video_publisher, 'video_encoder', fail)
+    link.subscribe(lambda message: None)
+    link.until(lambda: link.report().level == WARN, 'a warning')
+    assert link.report().reasons == ['image_raw/video: video needs PyAV, which is missing here']
+    assert link.report().values['video encoder'] == 'none'
+
+
+def test_grey_pictures_are_video_too(link):
+    pictures = []
+    ImageSubscription(
+        link.base, 'image_raw', lambda *picture: pictures.append(picture), transport='video'
+    )
+    grey = np.full((SIZE[1], SIZE[0]), 77, np.uint8)
+
+    def step():
+        link.video.put(grey, 'mono8', Header(), SETTINGS)
+        link.step()
+        return any(abs(cv2.mean(image)[0] - 77) < CLOSE for image, *_ in pictures)
+
+    wait_for(step, what='a grey picture')
