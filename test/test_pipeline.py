@@ -136,7 +136,7 @@ def test_what_a_teleoperation_stack_needs_is_there(rig, watcher):
     assert taken['panorama/image/compressed'].header.frame_id == 'panorama_optical_frame'
 
 
-@pytest.mark.parametrize('transport', ['raw', 'compressed'])
+@pytest.mark.parametrize('transport', ['raw', 'compressed', 'video'])
 def test_the_one_node_takes_cameras_that_other_nodes_read(rig, watcher, transport):
     for side in SIDES:
         rig.start(f'{side}/capture')
@@ -144,8 +144,9 @@ def test_the_one_node_takes_cameras_that_other_nodes_read(rig, watcher, transpor
     wait_for(lambda: rig.check_alive() or watcher.is_measured, START_S, 'an overlap')
     (overlap,) = watcher.overlaps.overlaps
     assert overlap.offset_deg == pytest.approx(140, abs=0.5)
-    taken = [watcher.node.count_subscribers(f'left/image_raw{end}') for end in ('', '/compressed')]
-    assert taken == ([1, 0] if transport == 'raw' else [0, 1])
+    topics = {'raw': '', 'compressed': '/compressed', 'video': '/video/compressed'}
+    for name, end in topics.items():
+        assert watcher.node.count_subscribers(f'left/image_raw{end}') == (name == transport)
 
 
 @pytest.mark.parametrize(
