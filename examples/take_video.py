@@ -25,7 +25,7 @@ def take(message):
 
 rclpy.init()
 node = rclpy.create_node('take_video')
-node.create_subscription(CompressedImage, 'panorama/video/compressed', take, 5)
+node.create_subscription(CompressedImage, 'panorama/video/compressed', take, 30)
 while not pictures:
     rclpy.spin_once(node)
 cv2.imwrite(sys.argv[1], pictures[-1])

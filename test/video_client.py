@@ -12,7 +12,7 @@ from ffmpeg_image_transport_msgs.msg import FFMPEGPacket
 from foxglove_msgs.msg import CompressedVideo
 from sensor_msgs.msg import CompressedImage
 
-from fisheye_bridge.qos import VIDEO
+from fisheye_bridge.qos import VIDEO_INPUT
 from fisheye_bridge.stamps import ns_of
 from fisheye_core.nal_units import is_keyframe
 
@@ -40,7 +40,7 @@ def main():
     node = rclpy.create_node('video_client')
     subscriptions = [
         node.create_subscription(
-            kind, topic, lambda m, topic=topic, fields=fields: take(topic, fields, m), VIDEO
+            kind, topic, lambda m, topic=topic, fields=fields: take(topic, fields, m), VIDEO_INPUT
         )
         for kind, topic, fields in TOPICS
     ]

@@ -11,7 +11,10 @@ IMAGE_INPUT = QoSProfile(depth=3, reliability=ReliabilityPolicy.RELIABLE)
 """Images as they are taken: a moment without the processor loses none."""
 
 VIDEO = QoSProfile(depth=5, reliability=ReliabilityPolicy.RELIABLE)
-"""Video: each picture is drawn upon those before, so a few may be sent again, but none late."""
+"""Video as it is published: one that is lost breaks those after it, so a few are sent again."""
+
+VIDEO_INPUT = QoSProfile(depth=30, reliability=ReliabilityPolicy.RELIABLE)
+"""Video as it is taken: all of it has to be decoded, and that is quick."""
 
 BEST_EFFORT_INPUT = QoSProfile(depth=3, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Where the publisher is not ours: this meets a reliable one and a best-effort one."""

@@ -13,7 +13,13 @@ from std_msgs.msg import Header
 
 from fisheye_bridge.diagnostics import DropCounter
 from fisheye_bridge.images import ImageBuffer, from_jpeg, jpeg_message, to_array, to_jpeg
-from fisheye_bridge.qos import ADJUSTABLE, BEST_EFFORT_INPUT, IMAGE, IMAGE_INPUT, VIDEO
+from fisheye_bridge.qos import (
+    ADJUSTABLE,
+    BEST_EFFORT_INPUT,
+    IMAGE,
+    IMAGE_INPUT,
+    VIDEO_INPUT,
+)
 from fisheye_bridge.video_input import VideoInput
 from fisheye_core.errors import FisheyeError
 
@@ -95,7 +101,7 @@ _TRANSPORTS = {
     'video': _Transport(
         CompressedImage,
         '/video/compressed',
-        VIDEO,
+        VIDEO_INPUT,
         lambda node, topic: VideoInput(node, f'{topic}/video'),
     ),
 }

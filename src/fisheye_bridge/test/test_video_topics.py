@@ -12,7 +12,7 @@ from std_msgs.msg import Header
 
 from fisheye_bridge import video_publisher
 from fisheye_bridge.diagnostics import WARN, Report
-from fisheye_bridge.qos import VIDEO
+from fisheye_bridge.qos import VIDEO, VIDEO_INPUT
 from fisheye_bridge.stamps import ns_of, stamp_of
 from fisheye_bridge.topics import ImageSubscription
 from fisheye_bridge.video_publisher import VideoPublisher
@@ -55,7 +55,7 @@ class Link:
     def subscribe(self, take):
         """Take the messages as they are."""
         return self.base.create_subscription(
-            CompressedImage, 'image_raw/video/compressed', take, VIDEO
+            CompressedImage, 'image_raw/video/compressed', take, VIDEO_INPUT
         )
 
     def step(self, settings=SETTINGS):
