@@ -12,6 +12,7 @@ from pathlib import Path
 from compose import WAYS, Composing, composing_targets, measure_composing
 from machine import describe_machine
 from nodes import Run, measure_nodes, node_targets
+from stages import Stage, measure_stages
 
 from fisheye_core.errors import FisheyeError
 
@@ -33,8 +34,10 @@ def main() -> int:
     arguments.out.mkdir(parents=True, exist_ok=True)
     composing = measure_composing(arguments.short)
     print_composing(composing)
-    runs = []
+    stages, runs = [], []
     if not arguments.short:
+        stages = measure_stages()
+        print_stages(stages)
         print_nodes_header()
         for run in measure_nodes(arguments.seconds, arguments.out / 'log'):
             print_run(run)
@@ -44,6 +47,7 @@ def main() -> int:
     results = {
         'machine': machine,
         'composing': [asdict(result) for result in composing],
+        'stages': [asdict(stage) for stage in stages],
         'nodes': [asdict(run) for run in runs],
         'paper_hz': PAPER_HZ,
     }
@@ -63,6 +67,14 @@ def print_composing(results: list[Composing]) -> None:
                 f'  {way:14s} {result.times_ms[way]!s:24s} ms  {result.to_floor[way]:5.2f} floors'
                 f'  {result.to_one_remap[way]:5.2f} remaps'
             )
+
+
+def print_stages(stages: list[Stage]) -> None:
+    """Print what a panorama costs from the cameras' bytes to those on the link."""
+    print('\nFrom the cameras to the link, 640x480, one thread        CPU ms  Mbit/s at 30 Hz')
+    for stage in stages:
+        mbit_s = '' if stage.mbit_s is None else f'{stage.mbit_s:.2f}'
+        print(f'  {stage.name:34s} {stage.cpu_ms!s:>24s} {mbit_s:>7s}')
 
 
 def print_nodes_header() -> None:

@@ -61,17 +61,19 @@ class CameraSubscription:
         namespace
             Of the topics, below that of the node.
         transport
-            'raw' or 'compressed', of the pictures.
+            'raw', 'compressed' or 'video', of the pictures.
         cut
             Takes the camera's part out of each picture; a `FisheyeError` that it raises drops the
             picture. None: it is all of it.
         """
         self._node, self._cut = node, cut
+        self._is_padded = transport == 'video'
         self._on_picture, self._on_lens, self._check = on_picture, on_lens, check
         self._prefix = f'{namespace}/' if namespace else ''
         self._seen: LensWithImageCircle | None = None
         self._content, self._header = '', Header()
         self._picture_size: tuple[int, int] | None = None
+        self._described: tuple[int, int] | None = None
         self._refusal, self._is_over, self._note = '', False, ''
         self._refused, self._again_s = '', 0.0
         self._settling = Settling()
@@ -142,6 +144,7 @@ class CameraSubscription:
             return
         try:
             lens = lens_of(message)
+            self._described = lens.width, lens.height
             if self._picture_size not in (None, (lens.width, lens.height)):
                 whole = f'{size[0]}x{size[1]} px'
                 part = '' if readout == Readout() else f' ({whole} with {readout})'
@@ -163,7 +166,10 @@ class CameraSubscription:
     def _take_picture(self, image: np.ndarray, encoding: str, header: Header) -> None:
         if self._cut:
             image = self._cut(image)
-        self._picture_size = image.shape[1::-1]
+        if self._is_padded and self._described:
+            image = _unpadded(image, *self._described)
+        if self._described or not self._is_padded:
+            self._picture_size = image.shape[1::-1]
         seen = self._seen
         if seen and seen.look(image):
             self._tell(seen.lens)
@@ -177,3 +183,9 @@ class CameraSubscription:
             self._on_lens(lens, self._header)
         except FisheyeError as error:
             self.refuse(error)
+
+
+def _unpadded(image: np.ndarray, width: int, height: int) -> np.ndarray:
+    """Take off the column or row that video repeats where a camera's sides are odd."""
+    is_padded = image.shape[1::-1] == (width + width % 2, height + height % 2)
+    return image[:height, :width] if is_padded else image

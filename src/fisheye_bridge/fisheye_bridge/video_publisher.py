@@ -1,12 +1,9 @@
 """Pictures as video, encoded while anybody subscribes, in every message type that is installed."""
 
-import importlib
 from array import array
-from collections.abc import Callable
-from dataclasses import dataclass
 from threading import Event
 from time import monotonic
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rclpy.event_handler import PublisherEventCallbacks
@@ -15,7 +12,7 @@ from std_msgs.msg import Empty, Header
 
 from fisheye_bridge.diagnostics import WARN, Report
 from fisheye_bridge.qos import VIDEO
-from fisheye_bridge.stamps import ns_of
+from fisheye_bridge.video_messages import VideoPicture, message_types
 from fisheye_core.errors import FisheyeError
 from fisheye_core.latest_only import LatestOnlyWorker
 from fisheye_core.rate_meter import RateMeter
@@ -28,63 +25,6 @@ if TYPE_CHECKING:
 _ANSWER_S = 0.3
 """Who asks for a keyframe sooner after one has not seen it yet."""
 _REPORT_S = 1.0
-
-
-@dataclass(frozen=True, eq=False)
-class _Picture:
-    """What waits to be encoded: (height, width[, 3]) uint8 in an encoding."""
-
-    image: np.ndarray
-    encoding: str
-    header: Header
-    settings: VideoSettings
-
-
-@dataclass(frozen=True)
-class _Kind:
-    """A type of message: where it is defined, on which topic, and its fields beside the data."""
-
-    module: str
-    name: str
-    topic: str
-    fields: Callable[['EncodedPicture', _Picture], dict[str, Any]]
-
-
-_KINDS = (
-    _Kind(
-        'sensor_msgs.msg',
-        'CompressedImage',
-        '{video}/compressed',
-        lambda encoded, picture: {
-            'header': picture.header,
-            'format': picture.settings.video_codec,
-        },
-    ),
-    _Kind(
-        'foxglove_msgs.msg',
-        'CompressedVideo',
-        '{video}',
-        lambda encoded, picture: {
-            'timestamp': picture.header.stamp,
-            'frame_id': picture.header.frame_id,
-            'format': picture.settings.video_codec,
-        },
-    ),
-    _Kind(
-        'ffmpeg_image_transport_msgs.msg',
-        'FFMPEGPacket',
-        '{image}/ffmpeg',
-        lambda encoded, picture: {
-            'header': picture.header,
-            'width': picture.image.shape[1],
-            'height': picture.image.shape[0],
-            'encoding': f'{picture.settings.video_codec};yuv420p;bgr8;{picture.encoding}',
-            'pts': ns_of(picture.header.stamp),
-            'flags': int(encoded.is_keyframe),  # AV_PKT_FLAG_KEY
-        },
-    ),
-)
-"""Only the first is always there; the packages of the others are not among our dependencies."""
 
 
 class VideoPublisher:
@@ -110,8 +50,7 @@ class VideoPublisher:
                     event_callbacks=joined,
                 ),
             )
-            for kind in _KINDS
-            if (kind_class := _class_of(kind))
+            for kind, kind_class in message_types()
         ]
         node.create_subscription(Empty, f'{video}/keyframe', self._take_request, VIDEO)
         self._worker = LatestOnlyWorker(self._publish, 'video')
@@ -137,7 +76,7 @@ class VideoPublisher:
         settings
             Those of now.
         """
-        self._worker.put(_Picture(image.copy(), encoding, header, settings))
+        self._worker.put(VideoPicture(image.copy(), encoding, header, settings))
 
     def stop(self) -> None:
         """End the thread."""
@@ -166,7 +105,7 @@ class VideoPublisher:
         if monotonic() - self._keyframe_s > _ANSWER_S:
             self._is_keyframe_wanted.set()
 
-    def _publish(self, picture: _Picture) -> None:
+    def _publish(self, picture: VideoPicture) -> None:
         begin_s = monotonic()
         try:
             encoded = self._encoded(picture)
@@ -182,7 +121,7 @@ class VideoPublisher:
             if publisher.get_subscription_count():
                 publisher.publish(kind_class(data=data, **kind.fields(encoded, picture)))
 
-    def _encoded(self, picture: _Picture) -> 'EncodedPicture':
+    def _encoded(self, picture: VideoPicture) -> 'EncodedPicture':
         settings = picture.settings
         encoder = self._encoder = self._encoder or video_encoder(settings)
         encoder.bitrate_kbps = settings.video_bitrate_kbps
@@ -200,10 +139,3 @@ class VideoPublisher:
         if fault and fault != self._fault:
             self._node.get_logger().warning(f'{self._video}: {fault}')
         self._fault = fault
-
-
-def _class_of(kind: _Kind) -> type | None:
-    try:
-        return getattr(importlib.import_module(kind.module), kind.name)
-    except ImportError:
-        return None

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
-from sensor_msgs.msg import CompressedImage
+from sensor_msgs.msg import CameraInfo, CompressedImage
 from std_msgs.msg import Header
 
 from fisheye_bridge import video_publisher
+from fisheye_bridge.camera_topics import CameraSubscription
 from fisheye_bridge.diagnostics import WARN, Report
-from fisheye_bridge.qos import VIDEO, VIDEO_INPUT
+from fisheye_bridge.qos import IMAGE, VIDEO, VIDEO_INPUT
 from fisheye_bridge.stamps import ns_of, stamp_of
 from fisheye_bridge.topics import ImageSubscription
 from fisheye_bridge.video_publisher import VideoPublisher
@@ -27,6 +28,7 @@ SIZE = 160, 120
 SOON = 5
 """Pictures: what passes until a new subscriber and the publisher have found each other."""
 CLOSE = 6.0
+FUZZED = 1000
 
 
 class Link:
@@ -58,9 +60,10 @@ class Link:
             CompressedImage, 'image_raw/video/compressed', take, VIDEO_INPUT
         )
 
-    def step(self, settings=SETTINGS):
-        """Publish a picture whose grey is its number, and let come what comes."""
+    def step(self, image=None, settings=SETTINGS):
+        """Publish a picture, grey as its number, and let come what comes."""
         grey = np.full((SIZE[1], SIZE[0], 3), 30 + self.sent % 200, np.uint8)
+        grey = grey if image is None else image
         self.sent += 1
         self.video.put(grey, 'bgr8', Header(stamp=stamp_of(self.sent)), settings)
         self._executor.spin_once(0.02)
@@ -175,3 +178,46 @@ def test_grey_pictures_are_video_too(link):
         return any(abs(cv2.mean(image)[0] - 77) < CLOSE for image, *_ in pictures)
 
     wait_for(step, what='a grey picture')
+
+
+def test_pictures_of_odd_sides_come_as_their_camera_info_describes_them(link):
+    width, height, pictures, lenses = 161, 119, [], []
+    CameraSubscription(
+        link.base,
+        on_picture=lambda image, *_: pictures.append(image.shape[1::-1]),
+        on_lens=lambda lens, _: lenses.append(lens),
+        check=lambda lens: None,
+        transport='video',
+    )
+    infos = link.robot.create_publisher(CameraInfo, 'camera_info', IMAGE)
+    k = [50.0, 0.0, width / 2, 0.0, 50.0, height / 2, 0.0, 0.0, 1.0]
+    info = CameraInfo(width=width, height=height, distortion_model='equidistant', k=k, d=[0.0] * 4)
+    image = np.full((height, width, 3), 120, np.uint8)
+
+    def step():
+        infos.publish(info)
+        link.step(image)
+        return lenses and pictures[-5:] == [(width, height)] * 5
+
+    wait_for(step, what='pictures of the size of the camera')
+
+
+def test_a_thousand_fuzzed_messages_are_survived_told_and_mended(link):
+    pictures, genuine = [], []
+    base = ImageSubscription(
+        link.base, 'image_raw', lambda *picture: pictures.append(picture), transport='video'
+    )
+    link.subscribe(genuine.append)
+    intruder = link.robot.create_publisher(CompressedImage, 'image_raw/video/compressed', VIDEO)
+    link.until(lambda: len(genuine) > 5, 'video to spoil')
+    rng = np.random.default_rng(5)
+    for _ in range(FUZZED):
+        data = bytearray(genuine[rng.integers(len(genuine))].data)
+        for at in rng.integers(len(data), size=rng.integers(1, 50)):
+            data[at] = rng.integers(256)
+        del data[rng.integers(1, len(data) + 1) :]
+        intruder.publish(CompressedImage(format='h264', data=array('B', bytes(data))))
+        link.step()
+    assert base.dropped.count > 0
+    before = len(pictures)
+    link.until(lambda: len(pictures) > before + 5, 'pictures again')

@@ -26,7 +26,7 @@ MAX_SIDE_PX = 8688
 """Of level 5.1, which every decoder takes (ITU-T H.264, table A-1): 9.4 million px."""
 _USUAL_HZ = 30.0
 _PIXELS_OF_A_THREAD = 1_000_000
-_RATE, _BUFFER_S = 0.9, 0.15
+_RATE, _BUFFER_S = 0.85, 0.2
 """Shares of the cap: in no second more than their sum, as a full buffer adds to the rate."""
 _COMMON = {'colorspace': 'smpte170m', 'color_range': 'tv'}
 _OPTIONS = {
