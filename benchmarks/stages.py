@@ -13,8 +13,9 @@ from timing import Spread, spread
 from turning import turning
 
 from fisheye_core.coded_picture import decoded
-from fisheye_core.h264_encoder import H264Encoder, to_planes
-from fisheye_core.video import video_decoder
+from fisheye_core.h264_encoder import to_planes
+from fisheye_core.video import video_decoder, video_encoder
+from fisheye_core.video_settings import VideoSettings
 
 RATE_HZ = 30.0
 COUNT = 90
@@ -41,45 +42,62 @@ def measure_stages() -> list[Stage]:
     first = np.empty((surface.height, surface.width, 3), np.uint8)
     compositor.compose(pair.images, first)
     panoramas = list(turning(first, _PANORAMA_DEG, RATE_HZ, COUNT))
-    cameras = list(turning(pair.images[0], _CAMERA_DEG, RATE_HZ, COUNT // 3))
+    cameras = list(turning(pair.images[0], _CAMERA_DEG, RATE_HZ, COUNT))
     threads = cv2.getNumThreads()
     cv2.setNumThreads(1)
     try:
         return [
-            *_before(pair.images, compositor, [_jpeg(c, _CAMERA_QUALITY) for c in cameras]),
+            *_before(pair.images, compositor, cameras),
             *_after(panoramas),
         ]
     finally:
         cv2.setNumThreads(threads)
 
 
-def _before(images, compositor, jpegs) -> list[Stage]:
-    def decode(jpeg):
-        return decoded(jpeg), decoded(jpeg)
-
+def _before(images, compositor, cameras) -> list[Stage]:
     surface = compositor.layout.surface
     out = np.empty((surface.height, surface.width, 3), np.uint8)
+    jpegs = [_jpeg(camera, _CAMERA_QUALITY) for camera in cameras]
+    encoded, packets = _encoding(cameras)
+    decoder = video_decoder()
     return [
-        Stage('decode the JPEGs of both cameras', _cpu_ms(decode, jpegs), 2 * _mbit_s(jpegs)),
+        Stage(
+            'decode the JPEGs of both cameras',
+            _cpu_ms(lambda jpeg: (decoded(jpeg), decoded(jpeg)), jpegs),
+            2 * _mbit_s(jpegs),
+        ),
+        Stage('encode both cameras as H.264', _twice(encoded), 2 * _mbit_s(packets)),
+        Stage('at the base: decode these', _twice(_cpu_ms(decoder.decode, packets))),
         Stage('compose', _cpu_ms(lambda _: compositor.compose(images, out), jpegs)),
     ]
 
 
 def _after(panoramas) -> list[Stage]:
-    encoder = H264Encoder(bitrate_kbps=2000, keyframe_s=1.0, encoder='libx264')
-    decoder, packets, times_s = video_decoder(), [], iter(np.arange(COUNT) / RATE_HZ)
-
-    def encode(image):
-        packets.append(encoder.encode(image, 'bgr8', next(times_s)).data)
-
+    encoded, packets = _encoding(panoramas)
+    decoder = video_decoder()
     jpegs = [_jpeg(panorama, _QUALITY) for panorama in panoramas]
     return [
         Stage('encode as JPEG', _cpu_ms(lambda p: _jpeg(p, _QUALITY), panoramas), _mbit_s(jpegs)),
         Stage('convert to 4:2:0', _cpu_ms(lambda p: to_planes(p, 'bgr8'), panoramas)),
-        Stage('convert and encode as H.264', _cpu_ms(encode, panoramas), _mbit_s(packets)),
+        Stage('convert and encode as H.264', encoded, _mbit_s(packets)),
         Stage('at the base: decode the JPEG', _cpu_ms(decoded, jpegs)),
         Stage('at the base: decode the H.264', _cpu_ms(decoder.decode, packets)),
     ]
+
+
+def _encoding(pictures) -> tuple[Spread, list[bytes]]:
+    """Return what encoding pictures as H.264 takes, and the packets."""
+    settings = VideoSettings(video_encoder='libx264')
+    encoder, packets, times_s = video_encoder(settings), [], iter(np.arange(COUNT) / RATE_HZ)
+
+    def encode(image):
+        packets.append(encoder.encode(image, 'bgr8', next(times_s)).data)
+
+    return _cpu_ms(encode, pictures), packets
+
+
+def _twice(spread: Spread) -> Spread:
+    return Spread(2 * spread.median, 2 * spread.low, 2 * spread.high)
 
 
 def _jpeg(image: np.ndarray, quality: int) -> np.ndarray:

@@ -30,7 +30,7 @@ START_S, BUILD_S = 40.0, 300.0
 TOPIC = 'panorama/video/compressed'
 SAME_DB = 30.0
 """With the panorama of any other stamp it is less: the scene moves."""
-SOON = 5
+SOON = 8
 """Pictures: what passes until a new subscriber and the node have found each other."""
 COUNT = 30
 LOW_KBPS = 200

@@ -1,7 +1,7 @@
 """Pictures as video, encoded while anybody subscribes, in every message type that is installed."""
 
 from array import array
-from threading import Event
+from collections import deque
 from time import monotonic
 from typing import TYPE_CHECKING
 
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 _ANSWER_S = 0.3
 """Who asks for a keyframe sooner after one has not seen it yet."""
+_WELCOME_S = 0.0, 0.15
+"""When keyframes come after a subscriber: it may hear the publisher only after the first."""
 _REPORT_S = 1.0
 
 
@@ -35,7 +37,7 @@ class VideoPublisher:
         self._node, self._video = node, video
         self._encoder: H264Encoder | None = None
         self._fault, self._keyframe_s = '', 0.0
-        self._is_keyframe_wanted = Event()
+        self._due_s: deque[float] = deque()
         self._rate, self._encoding_ms, self._bytes = RateMeter(), 0.0, 0
         self._reported = 0, monotonic()
         joined = PublisherEventCallbacks(matched=self._welcome)
@@ -71,10 +73,8 @@ class VideoPublisher:
             (height, width[, 3]) uint8.
         encoding
             One of `fisheye_core.encodings.CHANNELS`.
-        header
-            Of the messages.
-        settings
-            Those of now.
+        header, settings
+            Of the messages; those of now.
         """
         self._worker.put(VideoPicture(image.copy(), encoding, header, settings))
 
@@ -99,11 +99,11 @@ class VideoPublisher:
 
     def _welcome(self, change) -> None:
         if change.current_count_change > 0:
-            self._is_keyframe_wanted.set()
+            self._due_s.extend(monotonic() + after_s for after_s in _WELCOME_S)
 
     def _take_request(self, _: Empty) -> None:
         if monotonic() - self._keyframe_s > _ANSWER_S:
-            self._is_keyframe_wanted.set()
+            self._due_s.append(monotonic())
 
     def _publish(self, picture: VideoPicture) -> None:
         begin_s = monotonic()
@@ -126,14 +126,20 @@ class VideoPublisher:
         encoder = self._encoder = self._encoder or video_encoder(settings)
         encoder.bitrate_kbps = settings.video_bitrate_kbps
         encoder.keyframe_s = settings.video_keyframe_s
-        if self._is_keyframe_wanted.is_set():
-            self._is_keyframe_wanted.clear()
+        if self._is_keyframe_due():
             encoder.request_keyframe()
         encoded = encoder.encode(picture.image, picture.encoding)
         if encoded.is_keyframe:
             self._keyframe_s = monotonic()
         self._tell(encoder.note)
         return encoded
+
+    def _is_keyframe_due(self) -> bool:
+        now_s, is_due = monotonic(), False
+        while self._due_s and self._due_s[0] <= now_s:
+            self._due_s.popleft()
+            is_due = True
+        return is_due
 
     def _tell(self, fault: str) -> None:
         if fault and fault != self._fault:
