@@ -26,6 +26,8 @@ ANGLE_DEG = 0.5
 NOT_BLACK = 0.99
 RED_BGR = (0, 0, 255)
 COLOUR_TOLERANCE = 8
+SAME_TOWN_DB = 20.0
+"""Though the ball has moved on; upside down it is 9."""
 
 
 def axis_px(panorama, folder, side):
@@ -83,6 +85,18 @@ def test_a_bearing_is_marked_where_the_projection_says(rig, watcher, bearing_deg
     assert difference.max() <= COLOUR_TOLERANCE
     beside = np.abs(marked[:, [x_px - 2, x_px + 2]].astype(int) - RED_BGR)
     assert beside.max(axis=(0, 2)).min() > COLOUR_TOLERANCE
+
+
+def test_a_client_of_the_video_gets_the_panorama(rig, watcher, tmp_path):
+    rig.start('panorama')
+    wait_for(lambda: rig.check_alive() or watcher.projection, START_S, 'a projection')
+    picture = tmp_path / 'picture.png'
+    rig.run('example', [sys.executable, str(EXAMPLES / 'take_video.py'), str(picture)])
+    code = rig.processes['example'].wait(START_S)
+    assert code == 0, rig.log('example').read_text()
+    taken, now = cv2.imread(str(picture)), watcher.picture()
+    height, width = now.shape[:2]
+    assert cv2.PSNR(taken[:height, :width], now) > SAME_TOWN_DB
 
 
 @pytest.mark.parametrize('is_real', [False, True], ids=['rules', 'launch'])

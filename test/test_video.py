@@ -39,14 +39,14 @@ CAP_EXCESS = 1.5
 
 
 class Taker:
-    """Takes a topic through a watcher's node until it is closed; messages by their stamps."""
+    """Subscriber of a topic through a watcher's node until it is closed; messages by stamp."""
 
     def __init__(self, watcher, kind=CompressedImage, topic=TOPIC, qos=VIDEO_INPUT):
         self.messages, self._node = {}, watcher.node
         self._subscription = self._node.create_subscription(kind, topic, self._take, qos)
 
     def close(self):
-        """Take no more; once more does nothing."""
+        """Unsubscribe; once more does nothing."""
         if self._subscription:
             self._node.destroy_subscription(self._subscription)
             self._subscription = None

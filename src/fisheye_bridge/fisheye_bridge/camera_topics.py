@@ -186,6 +186,6 @@ class CameraSubscription:
 
 
 def _unpadded(image: np.ndarray, width: int, height: int) -> np.ndarray:
-    """Take off the column or row that video repeats where a camera's sides are odd."""
+    """Remove the column or row that video repeats where a camera's sides are odd."""
     is_padded = image.shape[1::-1] == (width + width % 2, height + height % 2)
     return image[:height, :width] if is_padded else image

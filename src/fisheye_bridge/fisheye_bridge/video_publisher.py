@@ -65,7 +65,7 @@ class VideoPublisher:
     def put(
         self, image: np.ndarray, encoding: str, header: Header, settings: VideoSettings
     ) -> None:
-        """Have a copy of a picture encoded, in place of one that still waits.
+        """Queue a copy of a picture to be encoded, in place of one that still waits.
 
         Parameters
         ----------
@@ -98,7 +98,7 @@ class VideoPublisher:
         report.values['video pictures skipped'] = self._worker.dropped
 
     def _welcome(self, change) -> None:
-        if change.current_count_change > 0:
+        if change.total_count_change > 0:
             self._due_s.extend(monotonic() + after_s for after_s in _WELCOME_S)
 
     def _take_request(self, _: Empty) -> None:

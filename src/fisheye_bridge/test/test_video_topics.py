@@ -31,7 +31,7 @@ CLOSE = 6.0
 FUZZED = 1000
 
 
-class Link:
+class VideoLink:
     """A publisher of video and who else is there, spun by `step`."""
 
     def __init__(self):
@@ -55,7 +55,7 @@ class Link:
         rclpy.shutdown(context=self._context)
 
     def subscribe(self, take):
-        """Take the messages as they are."""
+        """Subscribe to the messages as they are."""
         return self.base.create_subscription(
             CompressedImage, 'image_raw/video/compressed', take, VIDEO_INPUT
         )
@@ -80,7 +80,7 @@ class Link:
 
 @pytest.fixture
 def link():
-    link = Link()
+    link = VideoLink()
     yield link
     link.stop()
 
@@ -104,6 +104,17 @@ def test_who_joins_gets_a_keyframe_though_none_was_due(link):
         assert any(is_keyframe(bytes(m.data)) for m in messages[:SOON])
     assert sum(is_keyframe(bytes(m.data)) for m in first) < len(first) / 4
     assert {m.format for m in first} == {'h264'}
+
+
+def test_who_leaves_and_comes_again_at_once_is_a_new_subscriber(link):
+    """One is gone and another is there before anybody looked: the number of them is the same."""
+    first, later = [], []
+    subscription = link.subscribe(first.append)
+    link.until(lambda: len(first) > 40, 'video')
+    link.base.destroy_subscription(subscription)
+    link.subscribe(later.append)
+    link.until(lambda: len(later) > SOON, 'video again')
+    assert any(is_keyframe(bytes(m.data)) for m in later[:SOON])
 
 
 def test_pictures_come_out_with_the_stamp_that_they_went_in_with(link):
