@@ -51,6 +51,7 @@ KEYS = {
     'yaml': 'python3-yaml',
     'scipy': 'python3-scipy',
     'aiohttp': 'python3-aiohttp',
+    'cryptography': 'python3-cryptography',
     'matplotlib': 'python3-matplotlib',
     'ament_index_python': 'ament_index_python',
     'av': 'python3-av',

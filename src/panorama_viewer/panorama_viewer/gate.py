@@ -7,8 +7,10 @@ token, or has a place to look from, is known: that connection stays.
 
 import asyncio
 import socket
+import ssl
 from collections import Counter, OrderedDict
 from collections.abc import Callable
+from contextlib import suppress
 from errno import EADDRNOTAVAIL, EAFNOSUPPORT
 from ipaddress import ip_address, ip_network
 from itertools import islice
@@ -16,10 +18,12 @@ from itertools import islice
 from aiohttp import web
 
 from panorama_viewer.allowance import Allowance
-from panorama_viewer.connection import Connection
+from panorama_viewer.connection import ANSWERED_WITHIN_S, Connection
 from panorama_viewer.faults import Faults
 
 MAX_STRANGERS = 128
+MAX_ENTERING = 128
+"""In the handshake of https, before they count as strangers."""
 _BACKLOG = 128
 _AT_ONCE = 16
 """Connections taken before the pictures have their turn again."""
@@ -36,11 +40,11 @@ _MAX_ADDRESSES = 1000
 class Gate:
     """Listens, and hands connections on to the web server."""
 
-    def __init__(self, faults: Faults):
-        self._faults = faults
+    def __init__(self, faults: Faults, tls: ssl.SSLContext | None = None):
+        self._faults, self._tls = faults, tls
         self._loop = asyncio.get_running_loop()
         self._listeners: list[socket.socket] = []
-        self._entering: set[asyncio.Task] = set()
+        self._entering: dict[asyncio.Task, None] = {}
         self._connections: dict[asyncio.BaseTransport, Connection] = {}
         self._strangers: dict[Connection, None] = {}
         self._allowances: OrderedDict[str, Allowance] = OrderedDict()
@@ -85,6 +89,8 @@ class Gate:
             self._loop.remove_reader(listener)
             listener.close()
         self._listeners.clear()
+        for entering in self._entering:
+            entering.cancel()
         for stranger in list(self._strangers):
             stranger.abort()
         self._let_go(len(self._refused))
@@ -139,14 +145,27 @@ class Gate:
             self._refuse(taken)
             return
         self._make_room(len(self._strangers) + 1 - MAX_STRANGERS)
+        for oldest in islice(self._entering, max(0, len(self._entering) + 1 - MAX_ENTERING)):
+            oldest.cancel()
         taken.setblocking(False)
-        entering = self._loop.create_task(
-            self._loop.connect_accepted_socket(
-                lambda: Connection(self, source, self._serve()), taken
+        entering = self._loop.create_task(self._enter(taken, source))
+        self._entering[entering] = None
+        entering.add_done_callback(lambda task: self._entered(task, taken))
+
+    def _entered(self, entering: asyncio.Task, taken: socket.socket) -> None:
+        del self._entering[entering]
+        if entering.cancelled():
+            taken.close()  # which nobody has done if it had not begun
+
+    async def _enter(self, taken: socket.socket, source: str) -> None:
+        """Make a connection of a socket; who does not get through the handshake just goes."""
+        with suppress(OSError):
+            await self._loop.connect_accepted_socket(
+                lambda: Connection(self, source, self._serve()),
+                taken,
+                ssl=self._tls,
+                ssl_handshake_timeout=ANSWERED_WITHIN_S if self._tls else None,
             )
-        )
-        self._entering.add(entering)
-        entering.add_done_callback(self._entering.discard)
 
     def _refuse(self, taken: socket.socket) -> None:
         """Hold a connection for a while, then close it."""

@@ -19,15 +19,16 @@ def pages() -> dict[str, Handler]:
     """Return what answers each path of the page."""
     web_files = files('panorama_viewer') / 'web'
     answers = {
-        f'/{path.name}': _page(path.name, path.read_bytes()) for path in web_files.iterdir()
+        f'/{path.name}': page(_TYPES[path.name.rpartition('.')[2]], path.read_bytes(), 'utf-8')
+        for path in web_files.iterdir()
     }
     return {'/': answers['/index.html'], **answers}
 
 
-def _page(name: str, body: bytes) -> Handler:
-    content_type = _TYPES[name.rpartition('.')[2]]
+def page(content_type: str, body: bytes, charset: str | None = None) -> Handler:
+    """Return what answers with the same bytes each time."""
 
     async def answer(_: web.Request) -> web.Response:
-        return web.Response(body=body, content_type=content_type, charset='utf-8')
+        return web.Response(body=body, content_type=content_type, charset=charset)
 
     return answer

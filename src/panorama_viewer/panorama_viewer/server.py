@@ -14,6 +14,7 @@ from aiohttp import web
 
 from fisheye_core.errors import SettingError
 from panorama_viewer.address import reachable, refusal
+from panorama_viewer.certificate import Tls
 from panorama_viewer.faults import Faults
 from panorama_viewer.gate import Gate
 from panorama_viewer.settings import ViewerSettings
@@ -40,6 +41,7 @@ class ViewerServer:
         calibrate: Callable[[], Future],
         watched: Callable[[], None],
         report: Callable[[str, str], None],
+        tls: Tls | None = None,
     ):
         """Prepare; `start` serves.
 
@@ -55,6 +57,8 @@ class ViewerServer:
         report
             Called with a sentence and a traceback when a part of the server fails, once for each
             kind of fault. All three are called in the server's thread.
+        tls
+            How to encrypt; None: not at all.
 
         Raises
         ------
@@ -63,7 +67,8 @@ class ViewerServer:
         """
         self.address = self.url = ''
         self._settings = settings
-        self._site = Site(settings, calibrate, watched)
+        self._tls = tls
+        self._site = Site(settings, calibrate, watched, tls.own if tls else b'')
         self._faults = Faults(report)
         self._loop = asyncio.new_event_loop()
         self._loop.set_exception_handler(self._faults.in_loop)
@@ -111,7 +116,7 @@ class ViewerServer:
         self._loop.call_soon_threadsafe(self._site.tell, state)
 
     async def _open(self) -> None:
-        self._gate = Gate(self._faults)
+        self._gate = Gate(self._faults, self._tls.context if self._tls else None)
         self._runner = web.AppRunner(
             self._site.application(self._gate),
             access_log=None,
@@ -122,7 +127,8 @@ class ViewerServer:
         host, token = self._settings.host, self._site.token
         serve: Any = self._runner.server  # there since `setup`
         port = await self._gate.open(host, self._settings.port, serve)
-        self.address = f'http://{reachable(host)}:{port}/'
+        scheme = 'https' if self._tls else 'http'
+        self.address = f'{scheme}://{reachable(host)}:{port}/'
         self.url = self.address + (f'#token={token}' if token else '')
 
     async def _close(self) -> None:

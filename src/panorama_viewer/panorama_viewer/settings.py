@@ -23,6 +23,18 @@ class ViewerSettings:
         'File that keeps the token from one start to the next; made, for its owner only, where '
         'there is none. Empty: a new token at each start.',
     )
+    https: bool = setting(
+        False,
+        'Serve encrypted. Only so do browsers on other machines show H.264; else JPEG.',
+    )
+    certificate: str = setting(
+        '',
+        'Certificate for https, a PEM file. Empty: one of its own, made at the first start and '
+        'kept in panorama_viewer.pem in ${ROS_HOME} (~/.ros).',
+    )
+    key: str = setting(
+        '', 'Its private key, a PEM file without a password. Empty: it is in the certificate.'
+    )
     save: bool = setting(
         False, 'Calibrate also saves the overlap, in the overlap_file of the node that stitches.'
     )

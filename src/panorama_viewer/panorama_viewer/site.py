@@ -14,7 +14,7 @@ from panorama_viewer.audience import Audience
 from panorama_viewer.browser import Browser, TimedJpeg, dismiss
 from panorama_viewer.gate import Gate
 from panorama_viewer.guard import HEADERS, SUBPROTOCOL, Guard
-from panorama_viewer.pages import pages
+from panorama_viewer.pages import page, pages
 from panorama_viewer.settings import ViewerSettings
 from panorama_viewer.token import kept_token, new_token
 
@@ -43,8 +43,9 @@ class Site:
         settings: ViewerSettings,
         calibrate: Callable[[], Future],
         watched: Callable[[], None],
+        certificate: bytes = b'',
     ):
-        """Prepare; the parameters are those of `ViewerServer`.
+        """Prepare; the parameters are those of `ViewerServer`, and a certificate to hand out.
 
         Raises
         ------
@@ -54,6 +55,7 @@ class Site:
         self.token = _token(settings)
         self.browsers = Audience(settings.max_clients, self._audience_changed)
         self._calibrate, self._watched = calibrate, watched
+        self._certificate = certificate
         self._guard = Guard(settings.host, self.token, settings.public)
         self._stale_after_s = settings.stale_after_s
         self._picture: TimedJpeg | None = None
@@ -70,8 +72,11 @@ class Site:
         app.router.add_get('/live', self._live)
         app.router.add_post('/calibrate', self._calibration)
         app.router.add_post('/snapshot', self._snapshot)
-        for path, page in pages().items():
-            app.router.add_get(path, page)
+        for path, answer in pages().items():
+            app.router.add_get(path, answer)
+        if self._certificate:
+            answer = page('application/x-x509-ca-cert', self._certificate)
+            app.router.add_get('/certificate.crt', answer)
         return app
 
     def show(self, jpeg: bytes) -> None:

@@ -13,12 +13,14 @@ from rclpy.node import Node
 from sensor_msgs.msg import CompressedImage
 
 from fisheye_bridge.diagnostics import ERROR, Diagnostics
+from fisheye_bridge.network import addresses
 from fisheye_bridge.parameters import Parameters
 from fisheye_bridge.projection import surface_of
 from fisheye_bridge.qos import IMAGE_INPUT, LATCHED
 from fisheye_bridge.running import run
 from fisheye_bridge.stamps import ns_of
 from fisheye_core.errors import FisheyeError, OverlapError
+from panorama_viewer.certificate import fingerprint, tls_of
 from panorama_viewer.projection import described
 from panorama_viewer.server import ViewerServer
 from panorama_viewer.settings import ViewerSettings
@@ -52,11 +54,13 @@ class ViewerNode(Node):
             self.create_subscription(kind, topic, take, qos)
         self._client = self.create_client(CalibrateOverlap, 'calibrate_overlap')
         self._watch = self.create_guard_condition(self._follow_browsers)
+        self._tls = tls_of(self._declared.settings, addresses())
         self._server = ViewerServer(
             self._declared.settings,
             calibrate=self._calibrate,
             watched=self._watch.trigger,
             report=self._note_fault,
+            tls=self._tls,
         )
         self._server.start()
         self._apply(self._declared.settings)
@@ -85,6 +89,11 @@ class ViewerNode(Node):
         """Log the address; the token goes to the terminal, because logs are read by others."""
         address, url = self._server.address, self._server.url
         self.get_logger().info(f'the panorama is at {address}')
+        if self._tls and self._tls.own:
+            self.get_logger().info(
+                f'the certificate is in {self._tls.path}; its SHA-256 is '
+                f'{fingerprint(self._tls.own)}'
+            )
         if url == address:
             return
         token_file = self._declared.settings.token_file

@@ -9,7 +9,7 @@ from panorama_viewer.settings import ViewerSettings
 def serve():
     servers = []
 
-    def start(calibrate=lambda: answered('measured'), watched=lambda: None, **settings):
+    def start(calibrate=lambda: answered('measured'), watched=lambda: None, tls=None, **settings):
         settings = ViewerSettings(**{'port': 0, 'stale_after_s': 60.0, **settings})
         faults = []
         server = ViewerServer(
@@ -17,6 +17,7 @@ def serve():
             calibrate=calibrate,
             watched=watched,
             report=lambda sentence, trace: faults.append(sentence),
+            tls=tls,
         )
         server.faults = faults
         servers.append(server)

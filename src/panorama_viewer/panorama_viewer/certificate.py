@@ -1,0 +1,181 @@
+"""The certificate for https: the user's, or one of the viewer's own that is kept between runs."""
+
+import os
+import socket
+import ssl
+import tempfile
+from collections.abc import Iterable
+from datetime import datetime, timedelta, timezone
+from ipaddress import ip_address, ip_network
+from pathlib import Path
+from typing import NamedTuple
+
+from cryptography import x509
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.hazmat.primitives.hashes import SHA256
+from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
+from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
+
+from fisheye_core.errors import FileAccessError, SettingError
+from panorama_viewer.settings import ViewerSettings
+
+_VALID = timedelta(days=820)
+"""iPhones believe none that is valid for more than 825 days."""
+_RENEWED = timedelta(days=60)
+"""Before its end: a viewer runs for days, and phones have to be told of a new one."""
+
+
+class Tls(NamedTuple):
+    """How to encrypt, the viewer's own certificate (PEM; empty for the user's), and its file."""
+
+    context: ssl.SSLContext
+    own: bytes
+    path: Path
+
+
+def tls_of(settings: ViewerSettings, addresses: Iterable[str]) -> Tls | None:
+    """Return how to serve as the settings say; None for http.
+
+    Parameters
+    ----------
+    settings
+        `https`, `certificate` and `key`.
+    addresses
+        Under which others reach this machine: an own certificate names them.
+
+    Raises
+    ------
+    SettingError
+        If certificate and key cannot be used together.
+    FileAccessError
+        If the own certificate cannot be read or written.
+    """
+    if not settings.https:
+        return None
+    if settings.key and not settings.certificate:
+        raise SettingError(f"key is '{settings.key}', but certificate is empty; expected both")
+    if settings.certificate:
+        path, key = Path(settings.certificate), Path(settings.key or settings.certificate)
+        return Tls(_context(path, key), b'', path)
+    path = Path(os.environ.get('ROS_HOME') or '~/.ros').expanduser() / 'panorama_viewer.pem'
+    now = datetime.now(timezone.utc)
+    own = kept_certificate(path, {*_own_names(), settings.host, *addresses}, now)
+    return Tls(_context(path, path), own, path)
+
+
+def _own_names() -> list[str]:
+    name = socket.gethostname().lower()
+    return ['localhost', name, f'{name}.local', '127.0.0.1', '::1']
+
+
+def _context(certificate: Path, key: Path) -> ssl.SSLContext:
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    for name, path in (('certificate', certificate), ('key', key)):
+        if not path.is_file():  # a FIFO would be waited for
+            raise SettingError(f"{name} is '{path}', which is no file; expected one in PEM")
+    try:
+        # Without a password OpenSSL would ask for one on the terminal.
+        context.load_cert_chain(certificate, key, password='')
+    except OSError as error:
+        raise SettingError(
+            f"certificate '{certificate}' and key '{key}' cannot be used: {error}; expected a "
+            'certificate and its key in PEM, without a password'
+        ) from error
+    return context
+
+
+def kept_certificate(path: Path, names: Iterable[str], now: datetime) -> bytes:
+    """Return the certificate (PEM) in a file that holds its key too.
+
+    A new one is made, readable for its owner only, where there is none, where it does not name
+    all names and addresses, and some weeks before it ends.
+
+    Parameters
+    ----------
+    path
+        Of the file.
+    names
+        Host names and addresses.
+    now
+        With its zone.
+
+    Raises
+    ------
+    FileAccessError
+        If the file cannot be read or written.
+    """
+    wanted = {_general_name(name) for name in names}
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if path.exists() and (kept := _usable(path.read_bytes(), wanted, now)):
+            return kept
+        certificate, key = _made(wanted, now)
+        descriptor, temporary = tempfile.mkstemp('.tmp', path.name, path.parent)
+        with os.fdopen(descriptor, 'wb') as file:
+            file.write(key + certificate)
+        Path(temporary).replace(path)
+    except OSError as error:
+        raise FileAccessError(path, 'used as certificate', error.strerror) from error
+    return certificate
+
+
+def fingerprint(certificate: bytes) -> str:
+    """Return what a browser shows of a certificate (PEM): SHA-256, in pairs of digits."""
+    return x509.load_pem_x509_certificate(certificate).fingerprint(SHA256()).hex(':').upper()
+
+
+def _general_name(name: str) -> x509.GeneralName:
+    try:
+        return x509.IPAddress(ip_address(name))
+    except ValueError:
+        return x509.DNSName(name.encode('idna').decode())
+
+
+def _usable(content: bytes, wanted: set[x509.GeneralName], now: datetime) -> bytes | None:
+    """Return the certificate in a file's content if it names all that is wanted and lasts."""
+    try:
+        certificate = x509.load_pem_x509_certificate(content)
+        names = certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName)
+    except (ValueError, x509.ExtensionNotFound):
+        return None
+    ends = getattr(certificate, 'not_valid_after_utc', None)
+    # Before cryptography 42 its times had no zone.
+    ends = ends or certificate.not_valid_after.replace(tzinfo=timezone.utc)
+    if ends - now < _RENEWED or not wanted <= set(names.value):
+        return None
+    return certificate.public_bytes(Encoding.PEM)
+
+
+def _made(names: set[x509.GeneralName], now: datetime) -> tuple[bytes, bytes]:
+    """Make a certificate and its key, both PEM.
+
+    It is an authority, because phones can be told to trust no other; but only for its own names,
+    so that nobody who got hold of the key could play another site to those phones (RFC 5280,
+    section 4.2.1.10).
+    """
+    key = ec.generate_private_key(ec.SECP256R1())
+    title = f'{socket.gethostname():.50} panorama'
+    subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, title)])
+    # Of the usages below the first is to sign handshakes, the sixth to sign certificates.
+    builder = (
+        x509.CertificateBuilder(subject, subject, key.public_key(), x509.random_serial_number())
+        .not_valid_before(now - timedelta(days=1))  # clocks differ
+        .not_valid_after(now + _VALID)
+    )
+    for extension, is_critical in (
+        (x509.SubjectAlternativeName(sorted(names, key=str)), False),
+        (x509.BasicConstraints(ca=True, path_length=0), True),
+        (x509.NameConstraints([_subtree(name) for name in sorted(names, key=str)], None), True),
+        (x509.KeyUsage(True, False, False, False, False, True, False, False, False), True),
+        (x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH]), False),
+        (x509.SubjectKeyIdentifier.from_public_key(key.public_key()), False),
+    ):
+        builder = builder.add_extension(extension, is_critical)
+    certificate = builder.sign(key, SHA256()).public_bytes(Encoding.PEM)
+    return certificate, key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
+
+
+def _subtree(name: x509.GeneralName) -> x509.GeneralName:
+    if isinstance(name, x509.IPAddress):
+        return x509.IPAddress(ip_network(name.value))
+    return name
