@@ -9,10 +9,9 @@ ENCODERS = ('auto', 'h264_nvenc', 'h264_v4l2m2m', 'h264_vaapi', 'libx264')
 
 
 @dataclass(frozen=True)
-class VideoSettings:
-    """How pictures become video, for whoever subscribes to it."""
+class EncoderSettings:
+    """How pictures are encoded."""
 
-    video_codec: str = setting('h264', 'Codec of the video.', choices=('h264',))
     video_bitrate_kbps: int = setting(
         2000,
         'Most kbit that the video takes in a second; easy pictures take less.',
@@ -20,6 +19,18 @@ class VideoSettings:
         maximum=100000,
         live=True,
     )
+    video_encoder: str = setting(
+        'auto',
+        'Encoder: one of the hardware, or libx264; auto is the first that works here.',
+        choices=ENCODERS,
+    )
+
+
+@dataclass(frozen=True)
+class VideoSettings(EncoderSettings):
+    """How pictures become video, for whoever subscribes to it."""
+
+    video_codec: str = setting('h264', 'Codec of the video.', choices=('h264',))
     video_keyframe_s: float = setting(
         1.0,
         'Longest time between two keyframes, at which a player can begin; 0: only when somebody '
@@ -28,9 +39,4 @@ class VideoSettings:
         minimum=0.0,
         maximum=60.0,
         live=True,
-    )
-    video_encoder: str = setting(
-        'auto',
-        'Encoder: one of the hardware, or libx264; auto is the first that works here.',
-        choices=ENCODERS,
     )

@@ -1,31 +1,33 @@
 """One browser that looks at the panorama, and what it has been sent."""
 
 import asyncio
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any, NamedTuple
+from statistics import median
+from typing import Any
 
 from aiohttp import WSCloseCode, web
 
+from fisheye_core.errors import VideoError
 from panorama_viewer.connection import Connection
+from panorama_viewer.feeds import JpegFeed, Picture, VideoFeed
 
-DRAWN = 'drawn'
-"""What a browser says when it has drawn a picture: nothing else is expected from it."""
+DRAWN, HEARD = 'drawn', 'heard'
+"""What a browser says when it has drawn a picture, and when it has heard the state."""
+RESTART, JPEG = 'h264', 'jpeg'
+"""What it says when its decoder cannot go on, and when it gives H.264 up."""
 SILENT_S = 30.0
 """Over a link on which a picture takes longer nobody can drive; a page that is hidden has left."""
 _FAREWELL_S = 1.0
 """What a browser that takes nothing more may hold its end up."""
-
-
-class TimedJpeg(NamedTuple):
-    """A JPEG and when it came, s of the event loop's clock."""
-
-    jpeg: bytes
-    came_s: float
+_TOLD_S = 2.0
+"""What the delay is told of."""
+_ROUND_TRIPS = 20
 
 
 class Browser:
-    """Sends state as it changes, and the newest picture whenever the last one was drawn.
+    """Sends state as it changes, and the newest picture whenever it takes another one.
 
     Attributes
     ----------
@@ -38,7 +40,8 @@ class Browser:
         stream: web.WebSocketResponse,
         connection: Connection,
         state: Callable[[], dict[str, Any]],
-        picture: Callable[[], TimedJpeg | None],
+        picture: Callable[[], Picture | None],
+        video: Callable[[], VideoFeed] | None,
         *,
         is_known: bool,
     ):
@@ -50,6 +53,8 @@ class Browser:
             The WebSocket, and what it runs over.
         state, picture
             Return the newest of each; None for no picture.
+        video
+            Returns its H.264, or raises a `VideoError`; None for a browser that wants JPEG.
         is_known
             Whether it has shown the token.
         """
@@ -57,12 +62,26 @@ class Browser:
         self._stream, self._connection = stream, connection
         self._state, self._picture = state, picture
         self._news, self._is_over = asyncio.Event(), asyncio.Event()
-        self._reason = ''
-        self._is_ready = True
+        self._reason = self._no_video = ''
+        self._feed: JpegFeed | VideoFeed = JpegFeed()
+        if video:
+            try:
+                self._feed = video()
+            except VideoError as error:
+                self._no_video = str(error)
         self._told: dict[str, Any] | None = None
-        self._sent: TimedJpeg | None = None
-        self._sent_s = self._way_s = 0.0
+        self._told_s: deque[float] = deque()
+        self._seen: Picture | None = None
+        self._under_way: deque[Picture] = deque()
+        self._ways: deque[tuple[float, float]] = deque()
+        self._trips_s: deque[float] = deque(maxlen=_ROUND_TRIPS)
         self._silence: asyncio.TimerHandle | None = None
+        self._words = {
+            DRAWN: self._drawn,
+            HEARD: self._heard,
+            RESTART: self._restart,
+            JPEG: self._give_up,
+        }
 
     def wake(self) -> None:
         """Announce a new picture or state."""
@@ -76,7 +95,8 @@ class Browser:
     async def serve(self) -> None:
         """Serve until the browser leaves or is shown out."""
         self.wake()
-        parts = [asyncio.create_task(part()) for part in (self._feed, self._hear, self._farewell)]
+        coroutines = self._serve_news(), self._hear(), self._farewell()
+        parts = [asyncio.create_task(coroutine) for coroutine in coroutines]
         try:
             ended, _ = await asyncio.wait(parts, return_when=asyncio.FIRST_COMPLETED)
             for part in ended:
@@ -90,7 +110,7 @@ class Browser:
         """Notify the browser that the viewer ends."""
         await self._stream.close(code=WSCloseCode.GOING_AWAY)
 
-    async def _feed(self) -> None:
+    async def _serve_news(self) -> None:
         with suppress(ConnectionError):  # it has left, which ends `_hear` too
             while True:
                 await self._news.wait()
@@ -99,19 +119,30 @@ class Browser:
 
     async def _hear(self) -> None:
         async for message in self._stream:
-            if message.data != DRAWN:
-                await dismiss(
-                    self._stream,
-                    self._connection,
-                    WSCloseCode.UNSUPPORTED_DATA,
-                    f'expected {DRAWN}',
-                )
+            if message.data not in self._words:
+                expected = f'expected {", ".join(self._words)}'
+                code = WSCloseCode.UNSUPPORTED_DATA
+                await dismiss(self._stream, self._connection, code, expected)
                 return
-            if not self._is_ready:
-                self._way_s = _now_s() - self._sent_s
-                self._stop_waiting()
-                self._is_ready = True
-                self.wake()
+            self._words[message.data]()
+
+    def _drawn(self) -> None:
+        if self._under_way:
+            now_s = _now_s()
+            self._feed.drawn(now_s)
+            self._ways.append((now_s, now_s - self._under_way.popleft().came_s))
+            self._watch_silence()
+            self.wake()
+
+    def _heard(self) -> None:
+        if self._told_s:
+            self._trips_s.append(_now_s() - self._told_s.popleft())
+
+    def _restart(self) -> None:
+        self._feed.restart()
+
+    def _give_up(self) -> None:
+        self._feed = JpegFeed()
 
     async def _farewell(self) -> None:
         await self._is_over.wait()
@@ -122,16 +153,47 @@ class Browser:
         state = self._state()
         if state is not self._told:
             self._told = state
-            way_ms = round(self._way_s * 1e3)
-            await self._stream.send_json({**state, 'way_ms': way_ms})
+            self._told_s.append(_now_s())
+            await self._stream.send_json({**state, **self._own_state()})
         picture = self._picture()
-        if self._is_ready and picture and picture is not self._sent:
-            self._is_ready, self._sent = False, picture
-            self._sent_s = _now_s()
+        if picture and picture is not self._seen and self._feed.takes(picture, _now_s()):
+            self._seen = picture
+            await self._send(picture)
+
+    async def _send(self, picture: Picture) -> None:
+        try:
+            data = await self._feed.coded(picture)
+        except VideoError as error:
+            self._no_video = str(error)
+            self._feed = JpegFeed()
+            data = picture.jpeg
+        if data:
+            self._feed.sent(_now_s())
+            self._under_way.append(picture)
+            self._watch_silence()
+            await self._stream.send_bytes(data)
+
+    def _own_state(self) -> dict[str, Any]:
+        """Return what is true of this browser alone."""
+        now_s = _now_s()
+        while self._ways and now_s - self._ways[0][0] > _TOLD_S:
+            self._ways.popleft()
+        # A page answers a state at once: of what it takes, half is the answer's way.
+        back_s = min(self._trips_s, default=0.0) / 2
+        way_s = median(way_s for _, way_s in self._ways) - back_s if self._ways else 0.0
+        return {
+            'way_ms': round(max(0.0, way_s) * 1e3),
+            'format': self._feed.name,
+            'no_video': self._no_video,
+        }
+
+    def _watch_silence(self) -> None:
+        """Wait for the next picture to be drawn, if one is under way."""
+        self._stop_waiting()
+        if self._under_way:
             self._silence = asyncio.get_running_loop().call_later(
                 SILENT_S, self.show_out, f'this page has drawn nothing for {SILENT_S:.0f} s'
             )
-            await self._stream.send_bytes(picture.jpeg)
 
     def _stop_waiting(self) -> None:
         if self._silence:

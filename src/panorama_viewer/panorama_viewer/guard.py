@@ -88,6 +88,11 @@ class Guard:
             return False
 
 
+def offers(request: web.Request, word: str) -> bool:
+    """Return whether a page's WebSocket offers a word beside the protocol."""
+    return word in _protocols(request)
+
+
 def _protocols(request: web.Request) -> list[str]:
     """Return the protocols that a WebSocket offers."""
     header = request.headers.get('Sec-WebSocket-Protocol', '')

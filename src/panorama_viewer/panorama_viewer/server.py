@@ -111,6 +111,10 @@ class ViewerServer:
         """Show a picture in every browser that is ready for one."""
         self._loop.call_soon_threadsafe(self._site.show, jpeg)
 
+    def apply(self, settings: ViewerSettings) -> None:
+        """Take the settings that can change while it runs."""
+        self._loop.call_soon_threadsafe(self._site.apply, settings)
+
     def tell(self, **state: Any) -> None:
         """Change parts of the state that the pages show: what JSON can hold."""
         self._loop.call_soon_threadsafe(self._site.tell, state)

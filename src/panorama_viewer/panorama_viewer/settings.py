@@ -3,10 +3,11 @@
 from dataclasses import dataclass
 
 from fisheye_core.settings import setting
+from fisheye_core.video_settings import EncoderSettings
 
 
 @dataclass(frozen=True)
-class ViewerSettings:
+class ViewerSettings(EncoderSettings):
     """What the viewer node can be told."""
 
     host: str = setting(

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
-from concurrent.futures import Future
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +11,10 @@ from aiohttp import WSCloseCode, web
 from fisheye_core.errors import FisheyeError
 from panorama_viewer.address import is_loopback
 from panorama_viewer.audience import Audience
-from panorama_viewer.browser import Browser, TimedJpeg, dismiss
+from panorama_viewer.browser import RESTART, Browser, dismiss
+from panorama_viewer.feeds import Picture, VideoFeed
 from panorama_viewer.gate import Gate
-from panorama_viewer.guard import HEADERS, SUBPROTOCOL, Guard
+from panorama_viewer.guard import HEADERS, SUBPROTOCOL, Guard, offers
 from panorama_viewer.pages import page, pages
 from panorama_viewer.settings import ViewerSettings
 from panorama_viewer.token import kept_token, new_token
@@ -57,8 +58,9 @@ class Site:
         self._calibrate, self._watched = calibrate, watched
         self._certificate = certificate
         self._guard = Guard(settings.host, self.token, settings.public)
-        self._stale_after_s = settings.stale_after_s
-        self._picture: TimedJpeg | None = None
+        self._settings = settings
+        self._worker = ThreadPoolExecutor(1, 'encode')
+        self._picture: Picture | None = None
         self._state: dict[str, Any] = {
             'stale_after_s': settings.stale_after_s,
             'needs_token': bool(self.token),
@@ -81,8 +83,12 @@ class Site:
 
     def show(self, jpeg: bytes) -> None:
         """Show a picture in every browser that is ready for one."""
-        self._picture = TimedJpeg(jpeg, asyncio.get_running_loop().time())
+        self._picture = Picture(jpeg, asyncio.get_running_loop().time())
         self._wake()
+
+    def apply(self, settings: ViewerSettings) -> None:
+        """Take what can change while it runs: the bit rate."""
+        self._settings = settings
 
     def tell(self, state: dict[str, Any]) -> None:
         """Change parts of the state that the pages show."""
@@ -92,6 +98,7 @@ class Site:
     async def close(self) -> None:
         """Close the connection to every browser."""
         await asyncio.gather(*(browser.close() for browser in self.browsers))
+        self._worker.shutdown(cancel_futures=True)
 
     def _audience_changed(self) -> None:
         if len(self.browsers):
@@ -102,10 +109,10 @@ class Site:
         for browser in self.browsers:
             browser.wake()
 
-    def _fresh(self) -> TimedJpeg | None:
+    def _fresh(self) -> Picture | None:
         """Return the newest picture if it is not stale."""
         now_s = asyncio.get_running_loop().time()
-        if self._picture and now_s - self._picture.came_s < self._stale_after_s:
+        if self._picture and now_s - self._picture.came_s < self._settings.stale_after_s:
             return self._picture
         return None
 
@@ -126,7 +133,10 @@ class Site:
             await dismiss(stream, connection, WSCloseCode.POLICY_VIOLATION, sentence)
             return stream
         is_known = self._guard.has_token(request)
-        browser = Browser(stream, connection, lambda: self._state, self._fresh, is_known=is_known)
+        video = self._video if offers(request, RESTART) else None
+        browser = Browser(
+            stream, connection, lambda: self._state, self._fresh, video, is_known=is_known
+        )
         if not self.browsers.enter(browser):
             sentence = f'{len(self.browsers)} browsers look already, which is the limit'
             await dismiss(stream, connection, WSCloseCode.TRY_AGAIN_LATER, sentence)
@@ -137,6 +147,10 @@ class Site:
         finally:
             self.browsers.leave(browser)
         return stream
+
+    def _video(self) -> VideoFeed:
+        now_s = asyncio.get_running_loop().time()
+        return VideoFeed(lambda: self._settings, self._worker, now_s)
 
     async def _calibration(self, request: web.Request) -> web.Response:
         """Request a calibration and describe its outcome."""

@@ -80,7 +80,8 @@ class ViewerNode(Node):
         super().destroy_node()
 
     def _apply(self, settings: ViewerSettings) -> None:
-        """Send the pages the size of the robot."""
+        """Follow live settings, and send the pages the size of the robot."""
+        self._server.apply(settings)
         self._server.tell(
             robot_width_m=settings.robot_width_m, camera_height_m=settings.camera_height_m
         )

@@ -1,17 +1,25 @@
 // The connection to the viewer: state and pictures; it comes back by itself.
 
-const SILENT_MS = 4000; // the server tells its state twice a second
-const RETRY_MS = 1000;
+const SILENT_MS = 1500; // the server tells its state twice a second
+const CONNECT_MS = 500; // a first packet that got lost would be sent again after a second
+const MOST_CONNECT_MS = 4000;
+const ATTEMPTS = 10; // before a connection gets more time
+const LOOK_MS = 100;
 const REFUSED = 1008; // the close code for a token that is missing or wrong
 
 export class Live {
-  /** `on` has the functions state, picture (gives a promise: drawn), lost and refused. */
-  constructor(token, on) {
+  /**
+   * `on` has the functions opened, state, picture (gives a promise: drawn), lost and refused;
+   * `takesVideo` says whether H.264 is wanted.
+   */
+  constructor(token, takesVideo, on) {
     this.token = token;
+    this.takesVideo = takesVideo;
     this.on = on;
     this.isRefused = false;
+    this.attempts = 0;
     this.open();
-    setInterval(() => this.watch(), RETRY_MS);
+    setInterval(() => this.watch(), LOOK_MS);
     // Who does not look leaves the place and the link to others.
     document.addEventListener('visibilitychange', () => {
       if (document.hidden) this.socket.close();
@@ -23,10 +31,13 @@ export class Live {
     this.socket?.close();
     this.heard = performance.now();
     this.isRefused = false;
-    const offered = ['panorama', ...(this.token.value ? [`token.${this.token.value}`] : [])];
+    this.attempts += 1;
+    this.on.opened();
+    const offered = ['panorama', ...(this.takesVideo() ? ['h264'] : []),
+      ...(this.token.value ? [`token.${this.token.value}`] : [])];
     const address = `${location.protocol.replace('http', 'ws')}//${location.host}/live`;
     const socket = new WebSocket(address, offered);
-    socket.binaryType = 'blob';
+    socket.binaryType = 'arraybuffer';
     socket.onmessage = ({ data }) => this.take(socket, data);
     socket.onclose = ({ code, reason }) => {
       if (socket !== this.socket) return;
@@ -37,9 +48,17 @@ export class Live {
     this.socket = socket;
   }
 
+  /** Tell the viewer a word. */
+  say(word, socket = this.socket) {
+    if (socket.readyState === WebSocket.OPEN) socket.send(word);
+  }
+
   async take(socket, data) {
+    if (socket !== this.socket) return; // what comes late of a connection that was given up
     this.heard = performance.now();
+    this.attempts = 0;
     if (typeof data === 'string') {
+      this.say('heard', socket);
       this.on.state(JSON.parse(data));
       return;
     }
@@ -47,17 +66,21 @@ export class Live {
       await this.on.picture(data);
     } finally {
       // A picture that could not be drawn does not keep the next one away.
-      if (socket.readyState === WebSocket.OPEN) socket.send('drawn');
+      this.say('drawn', socket);
     }
   }
 
-  /** Give up a connection that has gone silent, and open a new one for one that has ended. */
+  /** How long the connection may be silent, ms: it comes up at once where there is a link. */
+  get patience() {
+    if (this.socket.readyState === WebSocket.OPEN) return SILENT_MS;
+    return Math.min(CONNECT_MS * 2 ** Math.floor(this.attempts / ATTEMPTS), MOST_CONNECT_MS);
+  }
+
+  /** Open a new connection in place of one that has ended, has gone silent or does not come up. */
   watch() {
     if (document.hidden || this.isRefused) return;
-    if (this.socket.readyState >= WebSocket.CLOSING) this.open();
-    else if (performance.now() - this.heard > SILENT_MS) {
-      this.on.lost('');
-      this.open();
-    }
+    if (performance.now() - this.heard < this.patience) return;
+    if (this.socket.readyState === WebSocket.OPEN) this.on.lost('');
+    this.open();
   }
 }

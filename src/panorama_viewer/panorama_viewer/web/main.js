@@ -4,6 +4,7 @@ import { Buttons } from '/buttons.js';
 import * as controls from '/controls.js';
 import { stickTo } from '/gamepad.js';
 import { Live } from '/live.js';
+import { Pictures, obstacle } from '/pictures.js';
 import { Screen } from '/screen.js';
 import { Status } from '/status.js';
 import { Token } from '/token.js';
@@ -91,7 +92,16 @@ const status = new Status();
 const token = new Token(() => live.open());
 const buttons = new Buttons(token);
 new Viewer(screen);
-const live = new Live(token, {
+status.obstacle = await obstacle();
+const pictures = new Pictures({
+  restart: () => live.say('h264'),
+  giveUp(reason) {
+    status.obstacle = reason;
+    live.say('jpeg');
+  },
+});
+const live = new Live(token, () => !status.obstacle, {
+  opened: () => pictures.reset(),
   state(state) {
     const problems = state.problems ?? [];
     try {
@@ -103,8 +113,11 @@ const live = new Live(token, {
     status.take({ ...state, problems });
     screen.aids.take(state);
   },
-  async picture(blob) {
-    if (await screen.picture(blob)) status.picture();
+  async picture(data) {
+    const image = await pictures.image(data, screen.projection, screen.widest);
+    if (!image) return;
+    await screen.show(image);
+    status.picture();
   },
   lost: (reason) => status.lose(reason),
   refused() {

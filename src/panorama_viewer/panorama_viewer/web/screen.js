@@ -50,16 +50,16 @@ export class Screen {
     this.arrange();
   }
 
-  /** Show a JPEG; gives whether it was one, when it is on the screen. */
-  async picture(blob) {
-    const widest = this.look?.widest ?? Infinity;
-    const narrowed = this.projection?.width > widest ? { resizeWidth: widest } : {};
-    const bitmap = await createImageBitmap(blob, narrowed).catch(() => null);
-    if (!bitmap) return false;
+  /** Show a picture, settled when it is on the screen. */
+  async show(bitmap) {
     this.bitmap?.close();
     this.bitmap = bitmap;
     await this.redraw();
-    return true;
+  }
+
+  /** How wide a picture can be, px. */
+  get widest() {
+    return this.look?.widest ?? Infinity;
   }
 
   /** Give each canvas its place for the mode, and as many pixels as the screen has there. */

@@ -3,11 +3,14 @@
 const $ = (id) => document.getElementById(id);
 const SLOW = 0.8; // of the rate: below it this browser does not keep up
 const WINDOW_MS = 2000;
+const LATE_MS = 150; // control gets harder above it
+const TOO_LATE_MS = 300; // and is lost
 
 export class Status {
   constructor() {
     this.state = {};
     this.lost = 'connecting to the viewer';
+    this.obstacle = ''; // why this browser cannot show H.264
     this.drawn = []; // when pictures were drawn, ms
     setInterval(() => this.show(), 250);
   }
@@ -56,7 +59,11 @@ export class Status {
     const here = span ? ((this.drawn.length - 1) / span) * 1000 : 0;
     const slow = here < SLOW * rate ? `, ${here.toFixed(0)} here` : '';
     $('rate').textContent = isDead || !rate ? '–' : `${rate.toFixed(0)}/s${slow}`;
-    $('delay').textContent = isDead || delay_ms == null ? '–' : delay(delay_ms + way_ms);
+    const total_ms = isDead || delay_ms == null ? null : delay_ms + way_ms;
+    $('delay').textContent = total_ms === null ? '–' : delay(total_ms);
+    $('delay').dataset.level = total_ms > TOO_LATE_MS ? 'error' : total_ms > LATE_MS ? 'warning' : '';
+    $('format').textContent = isDead ? '–' : this.state.format ?? '–';
+    $('format').title = this.obstacle || this.state.no_video || '';
     $('skew').textContent = skew == null ? '–' : `${skew.toFixed(0)} ms`;
     $('overlap').textContent = overlaps?.map(confidence).join(', ') || '–';
     $('overlap').title = overlaps?.map(({ words }) => words).join('\n') ?? '';

@@ -1,0 +1,139 @@
+"""What a browser is sent of each panorama: the JPEG as it came, or H.264 of its own."""
+
+import asyncio
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import cached_property
+
+import numpy as np
+
+from fisheye_core.coded_picture import decoded
+from fisheye_core.errors import ImageFormatError
+from fisheye_core.video import video_encoder
+from fisheye_core.video_settings import EncoderSettings, VideoSettings
+from panorama_viewer.pace import NOMINAL_HZ, Pace
+
+DELTA, KEYFRAME = b'\0', b'\1'
+"""What a message with H.264 begins with; one with a JPEG begins as every JPEG does, with FF."""
+_KEYFRAME_S = 60.0
+"""Nothing is lost on the way to a page; one that cannot go on asks for a keyframe."""
+
+
+class Picture:
+    """A panorama as JPEG, and when it came, s of the event loop's clock."""
+
+    def __init__(self, jpeg: bytes, came_s: float):
+        self.jpeg, self.came_s = jpeg, came_s
+
+    @cached_property
+    def pixels(self) -> np.ndarray:
+        """(height, width, 3) uint8 BGR; an `ImageFormatError` if it is broken."""
+        return decoded(np.frombuffer(self.jpeg, np.uint8))
+
+
+class JpegFeed:
+    """Sends a picture as it came when the last one was drawn."""
+
+    name = 'JPEG'
+
+    def __init__(self):
+        self._is_drawn = True
+
+    def takes(self, _: Picture, __: float) -> bool:
+        """Return whether the newest picture can be sent now."""
+        return self._is_drawn
+
+    async def coded(self, picture: Picture) -> bytes:
+        """Return what to send of a picture."""
+        return picture.jpeg
+
+    def sent(self, _: float) -> None:
+        """Note that it was sent."""
+        self._is_drawn = False
+
+    def drawn(self, _: float) -> None:
+        """Note that the oldest picture on its way was drawn."""
+        self._is_drawn = True
+
+    def restart(self) -> None:
+        """Do nothing: each picture stands alone."""
+
+
+class VideoFeed:
+    """Sends H.264 that is encoded for one page, at the rate and the bit rate that its link takes.
+
+    What the page cannot take is not encoded: so each picture follows upon one that was sent.
+    """
+
+    name = 'H.264'
+
+    def __init__(
+        self, settings: Callable[[], EncoderSettings], worker: ThreadPoolExecutor, now_s: float
+    ):
+        """Prepare.
+
+        Parameters
+        ----------
+        settings
+            Returns the current ones.
+        worker
+            Of one thread, which encodes for every page.
+        now_s
+            The time, s.
+
+        Raises
+        ------
+        VideoError
+            If there is no encoder.
+        """
+        self._settings, self._worker = settings, worker
+        self._encoder = video_encoder(
+            VideoSettings(
+                video_bitrate_kbps=settings().video_bitrate_kbps,
+                video_encoder=settings().video_encoder,
+                video_keyframe_s=_KEYFRAME_S,
+            )
+        )
+        self._pace = Pace(settings().video_bitrate_kbps, now_s)
+        self._offered: Picture | None = None
+        self._count = 0
+
+    def takes(self, picture: Picture, now_s: float) -> bool:
+        """Return whether the newest picture can be sent now."""
+        is_new, self._offered = picture is not self._offered, picture
+        return self._pace.takes(self._settings().video_bitrate_kbps, now_s, is_new=is_new)
+
+    async def coded(self, picture: Picture) -> bytes:
+        """Return what to send of a picture; nothing of one that is broken.
+
+        Raises
+        ------
+        VideoError
+            If no encoder works.
+        """
+        return await asyncio.get_running_loop().run_in_executor(
+            self._worker, self._encode, picture
+        )
+
+    def sent(self, now_s: float) -> None:
+        """Note that it was sent."""
+        self._pace.sent(now_s)
+
+    def drawn(self, now_s: float) -> None:
+        """Note that the oldest picture on its way was drawn."""
+        self._pace.drawn(now_s)
+
+    def restart(self) -> None:
+        """Begin with the next picture anew."""
+        self._encoder.request_keyframe()
+
+    def _encode(self, picture: Picture) -> bytes:
+        self._encoder.bitrate_kbps = self._pace.nominal_kbps
+        self._count += 1
+        try:
+            # The pace sees to the rate; each picture has the same share of bits.
+            now_s = self._count / NOMINAL_HZ
+            encoded = self._encoder.encode(picture.pixels, now_s=now_s)
+            return (KEYFRAME if encoded.is_keyframe else DELTA) + encoded.data
+        except ImageFormatError:
+            return b''

@@ -1,0 +1,107 @@
+"""How much video a page gets: what its link takes, learnt from which pictures found it full.
+
+The link is full while the oldest picture on its way is overdue. What a page cannot take is left
+out, so no picture waits anywhere. Where pictures are left out time and again the bit rate goes
+down, within a second; where none are it goes up, slowly, and more slowly after each rise in vain.
+"""
+
+from collections import deque
+
+NOMINAL_HZ = 30.0
+"""Pictures a second that the encoder counts with."""
+_LEAST_KBPS = 100.0
+_PICTURE_KBIT = 33.0
+"""With less a picture is hardly worth having: the rate of pictures goes down instead."""
+_SLACK_S = 0.05
+"""What a picture may be late against the fastest one of the last seconds, and no longer."""
+_MEMORY_S = 10.0
+_WINDOW_S, _WINDOWS = 0.25, 3
+_BAD, _GOOD = 0.15, 0.05
+"""Shares of pictures left out."""
+_UNDER, _RISE = 0.95, 1.15
+_PAUSE_S, _LONGEST_PAUSE_S = 4.0, 60.0
+"""Between two rises. Each begins with a keyframe."""
+_IN_VAIN_S = 3.0
+
+
+class Pace:
+    """Bounds the pictures on their way to one page. Times are of one steady clock, s.
+
+    Attributes
+    ----------
+    kbps : float
+        What the page may be sent in a second.
+    """
+
+    def __init__(self, most_kbps: float, now_s: float):
+        self.kbps = most_kbps
+        self._under_way: deque[float] = deque()
+        self._ways: deque[tuple[float, float]] = deque()
+        self._shares: deque[float] = deque(maxlen=_WINDOWS)
+        self._offered = self._taken = 0
+        self._window_s = self._due_s = now_s
+        self._pause_s, self._rise_s, self._risen_s = _PAUSE_S, now_s + _PAUSE_S, -_IN_VAIN_S
+
+    @property
+    def rate_hz(self) -> float:
+        """Pictures a second, at most."""
+        return min(NOMINAL_HZ, self.kbps / _PICTURE_KBIT)
+
+    @property
+    def nominal_kbps(self) -> int:
+        """Bit rate at which pictures that came `NOMINAL_HZ` times a second would be as large."""
+        return round(self.kbps * NOMINAL_HZ / self.rate_hz)
+
+    def takes(self, most_kbps: float, now_s: float, *, is_new: bool) -> bool:
+        """Return whether a picture can be sent now; `is_new`: it is asked for the first time."""
+        self.kbps = min(self.kbps, most_kbps)
+        if now_s - self._window_s > _WINDOW_S:
+            self._judge(most_kbps, now_s)
+        is_due = self.rate_hz == NOMINAL_HZ or now_s >= self._due_s
+        self._offered += is_new and is_due
+        return is_due and not self._is_full(now_s)
+
+    def sent(self, now_s: float) -> None:
+        """Note that a picture was sent."""
+        self._under_way.append(now_s)
+        self._taken += 1
+        period_s = 1 / self.rate_hz
+        self._due_s = max(self._due_s, now_s - period_s / 2) + period_s
+
+    def drawn(self, now_s: float) -> None:
+        """Note that the page has drawn the oldest picture on its way."""
+        if self._under_way:
+            self._ways.append((now_s, now_s - self._under_way.popleft()))
+        while self._ways and now_s - self._ways[0][0] > _MEMORY_S:
+            self._ways.popleft()
+
+    def _is_full(self, now_s: float) -> bool:
+        if not self._under_way:
+            return False
+        fastest_s = min((way_s for _, way_s in self._ways), default=0.0)
+        return not fastest_s or now_s - self._under_way[0] > fastest_s + _SLACK_S
+
+    def _judge(self, most_kbps: float, now_s: float) -> None:
+        """Close a window of time, and change the bit rate if the last ones agree."""
+        if self._offered:
+            self._shares.append(max(0.0, 1 - self._taken / self._offered))
+        self._offered = self._taken = 0
+        self._window_s = now_s
+        if len(self._shares) < _WINDOWS:
+            return
+        if min(self._shares) > _BAD:
+            share = sum(self._shares) / _WINDOWS
+            self.kbps = max(_LEAST_KBPS, self.kbps * (1 - share) * _UNDER)
+            is_in_vain = now_s - self._risen_s < _IN_VAIN_S
+            self._pause_s = min(2 * self._pause_s, _LONGEST_PAUSE_S) if is_in_vain else _PAUSE_S
+            self._settle(now_s)
+        elif max(self._shares) > _GOOD:
+            self._rise_s = max(self._rise_s, now_s + 1.0)
+        elif now_s > self._rise_s and self.kbps < most_kbps:
+            self.kbps = min(self.kbps * _RISE, most_kbps)
+            self._risen_s = now_s
+            self._settle(now_s)
+
+    def _settle(self, now_s: float) -> None:
+        self._rise_s = now_s + self._pause_s
+        self._shares.clear()
