@@ -31,7 +31,7 @@ bench: build ## measure rates and delays (also bench-overlap, bench-calibration,
 bench-%: build
 	@$(run) python benchmarks/$*.py $(ARGS)
 
-bench bench-%: export PYTHONPATH := tools:src/fisheye_undistort/test:$(PYTHONPATH)
+bench bench-%: export PYTHONPATH := $(CURDIR)/tools:$(CURDIR)/test:$(CURDIR)/src/fisheye_undistort/test:$(PYTHONPATH)
 
 docs: build ## write the parameter tables of docs/ anew
 	@$(run) python tools/parameter_tables.py

@@ -103,6 +103,16 @@ class Ages(Watcher):
         self._azimuths_rad = np.arctan2(rays[:, 0], rays[:, 2])
         super().__init__(domain)
 
+    @property
+    def places(self) -> tuple[float, list[float]]:
+        """Row and columns of the painted blocks, as shares of the panorama."""
+        view = self.projection
+        shares = (self._columns(view) + 0.5) / view.width
+        return (view.center_y_px + 0.5) / view.height, shares.tolist()
+
+    def _columns(self, view) -> np.ndarray:
+        return view.center_x_px - OFFSET_PX / 2 + view.focal_px * self._azimuths_rad
+
     def restart(self) -> None:
         """Forget what came so far."""
         super().restart()
@@ -114,8 +124,7 @@ class Ages(Watcher):
         view = self.projection
         if view is None:
             return
-        axis_px = view.center_x_px - OFFSET_PX / 2
-        columns = np.rint(axis_px + view.focal_px * self._azimuths_rad).astype(int)
+        columns = np.rint(self._columns(view)).astype(int)
         row = round(view.center_y_px)
         image = to_array(message)[0]
         painted_ms = read(image[row - 1 : row + 2, columns].mean(axis=(0, 2)))

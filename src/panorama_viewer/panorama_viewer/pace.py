@@ -10,18 +10,23 @@ from collections import deque
 NOMINAL_HZ = 30.0
 """Pictures a second that the encoder counts with."""
 _LEAST_KBPS = 100.0
-_PICTURE_KBIT = 33.0
-"""With less a picture is hardly worth having: the rate of pictures goes down instead."""
-_SLACK_S = 0.05
-"""What a picture may be late against the fastest one of the last seconds, and no longer."""
+_PICTURE_KBIT, _LEAST_HZ = 33.0, 10.0
+"""With less a picture is hardly worth having: the rate of pictures goes down instead, at first."""
+_SLACK_S, _MOST_JITTER_S = 0.04, 0.1
+"""What a picture may be late against the fastest one of the last seconds: so long, and what two in
+turn differ by on average. Busy machines and repairs make them differ, queues do not."""
+_AVERAGED = 16
 _MEMORY_S = 10.0
 _WINDOW_S, _WINDOWS = 0.25, 3
-_BAD, _GOOD = 0.15, 0.05
+_BAD, _GOOD = 0.1, 0.05
 """Shares of pictures left out."""
-_UNDER, _RISE = 0.95, 1.15
-_PAUSE_S, _LONGEST_PAUSE_S = 4.0, 60.0
+_UNDER, _RISE = 0.95, 1.2
+_PAUSE_S, _LONGEST_PAUSE_S = 3.0, 60.0
 """Between two rises. Each begins with a keyframe."""
 _IN_VAIN_S = 3.0
+_HELPS, _HELP_S, _TRIES, _FUTILE_S = 0.5, 4.0, 1, 15.0
+"""Pictures half as large help if more than half as many more are taken soon after; if they do not,
+it is not the link, but a busy page."""
 
 
 class Pace:
@@ -37,15 +42,18 @@ class Pace:
         self.kbps = most_kbps
         self._under_way: deque[float] = deque()
         self._ways: deque[tuple[float, float]] = deque()
-        self._shares: deque[float] = deque(maxlen=_WINDOWS)
+        self._windows: deque[tuple[int, int]] = deque(maxlen=_WINDOWS)
         self._offered = self._taken = 0
+        self._jitter_s = 0.0
+        self._lowered, self._vain = (now_s, 0, most_kbps), 0
+        self._former_kbps, self._futile_s = most_kbps, now_s
         self._window_s = self._due_s = now_s
         self._pause_s, self._rise_s, self._risen_s = _PAUSE_S, now_s + _PAUSE_S, -_IN_VAIN_S
 
     @property
     def rate_hz(self) -> float:
         """Pictures a second, at most."""
-        return min(NOMINAL_HZ, self.kbps / _PICTURE_KBIT)
+        return min(max(_LEAST_HZ, self.kbps / _PICTURE_KBIT), NOMINAL_HZ)
 
     @property
     def nominal_kbps(self) -> int:
@@ -71,7 +79,11 @@ class Pace:
     def drawn(self, now_s: float) -> None:
         """Note that the page has drawn the oldest picture on its way."""
         if self._under_way:
-            self._ways.append((now_s, now_s - self._under_way.popleft()))
+            way_s = now_s - self._under_way.popleft()
+            if self._ways:
+                step_s = abs(way_s - self._ways[-1][1])
+                self._jitter_s += (step_s - self._jitter_s) / _AVERAGED
+            self._ways.append((now_s, way_s))
         while self._ways and now_s - self._ways[0][0] > _MEMORY_S:
             self._ways.popleft()
 
@@ -79,29 +91,46 @@ class Pace:
         if not self._under_way:
             return False
         fastest_s = min((way_s for _, way_s in self._ways), default=0.0)
-        return not fastest_s or now_s - self._under_way[0] > fastest_s + _SLACK_S
+        late_s = _SLACK_S + min(self._jitter_s, _MOST_JITTER_S)
+        return not fastest_s or now_s - self._under_way[0] > fastest_s + late_s
 
     def _judge(self, most_kbps: float, now_s: float) -> None:
         """Close a window of time, and change the bit rate if the last ones agree."""
         if self._offered:
-            self._shares.append(max(0.0, 1 - self._taken / self._offered))
+            self._windows.append((self._offered, self._taken))
         self._offered = self._taken = 0
         self._window_s = now_s
-        if len(self._shares) < _WINDOWS:
+        if len(self._windows) < _WINDOWS:
             return
-        if min(self._shares) > _BAD:
-            share = sum(self._shares) / _WINDOWS
-            self.kbps = max(_LEAST_KBPS, self.kbps * (1 - share) * _UNDER)
-            is_in_vain = now_s - self._risen_s < _IN_VAIN_S
-            self._pause_s = min(2 * self._pause_s, _LONGEST_PAUSE_S) if is_in_vain else _PAUSE_S
-            self._settle(now_s)
-        elif max(self._shares) > _GOOD:
+        shares = [max(0.0, 1 - taken / offered) for offered, taken in self._windows]
+        if min(shares) > 0 and sum(shares) > _WINDOWS * _BAD:
+            if now_s > self._futile_s:
+                self._lower((shares[-2] + shares[-1]) / 2, now_s)
+        elif max(shares) > _GOOD:
             self._rise_s = max(self._rise_s, now_s + 1.0)
         elif now_s > self._rise_s and self.kbps < most_kbps:
             self.kbps = min(self.kbps * _RISE, most_kbps)
             self._risen_s = now_s
             self._settle(now_s)
 
+    def _lower(self, share: float, now_s: float) -> None:
+        """Send less by the share that was left out, unless that did not help twice."""
+        taken = sum(taken for _, taken in self._windows)
+        lowered_s, taken_then, kbps_then = self._lowered
+        hoped_for = taken_then * (1 + _HELPS * (kbps_then / self.kbps - 1))
+        if now_s - lowered_s > _HELP_S or taken > hoped_for:
+            self._vain, self._former_kbps = 0, self.kbps
+        else:
+            self._vain += 1
+        self._lowered = now_s, taken, self.kbps
+        if self._vain > _TRIES:
+            self.kbps, self._futile_s = self._former_kbps, now_s + _FUTILE_S
+        else:
+            self.kbps = max(_LEAST_KBPS, self.kbps * (1 - share) * _UNDER)
+        is_in_vain = now_s - self._risen_s < _IN_VAIN_S
+        self._pause_s = min(2 * self._pause_s, _LONGEST_PAUSE_S) if is_in_vain else _PAUSE_S
+        self._settle(now_s)
+
     def _settle(self, now_s: float) -> None:
         self._rise_s = now_s + self._pause_s
-        self._shares.clear()
+        self._windows.clear()
