@@ -64,8 +64,9 @@ class SlowLink:
             _run(*end.prefix, 'ip', 'link', 'set', device, 'up')
             shape = ('root', 'tbf', 'rate', rate, 'burst', '4kb', 'limit', str(queue))
             _run(*end.prefix, 'tc', 'qdisc', 'add', 'dev', device, *shape)
+        arguments = *taps, quality.delay_ms / 1e3, quality.loss
         self._relay = subprocess.Popen(
-            [sys.executable, __file__, *map(str, taps), str(quality.delay_ms / 1e3), str(quality.loss)],
+            [sys.executable, __file__, *map(str, arguments)],
             stdin=subprocess.PIPE,
             pass_fds=taps,
             text=True,

@@ -22,6 +22,8 @@ from fisheye_geometry.surface import Surface
 from fisheye_geometry.surface_kind import KINDS
 from fisheye_testing.rig import camera_parameters
 from fisheye_testing.waiting import wait_for
+from panorama_viewer.address import is_loopback, reachable
+from panorama_viewer.certificate import tls_of
 from panorama_viewer.projection import described
 from panorama_viewer.server import ViewerServer
 from panorama_viewer.settings import ViewerSettings
@@ -69,6 +71,7 @@ def browser(tmp_path_factory):
     options.add_argument('--enable-unsafe-swiftshader')
     if os.geteuid() == 0:
         options.add_argument('--no-sandbox')
+    options.accept_insecure_certs = True
     downloads = tmp_path_factory.mktemp('downloads')
     options.add_experimental_option('prefs', {'download.default_directory': str(downloads)})
     driver = webdriver.Chrome(options, webdriver.ChromeService(shutil.which('chromedriver')))
@@ -135,7 +138,7 @@ def serve():
     """Return a function that shows one picture over and over, until `stop` is called."""
     ended, faults = [], []
 
-    def start(surface, image, wraps=False, **settings):
+    def start(surface, image, wraps=False, tls=None, **settings):
         measured = Future()
         measured.set_result('measured anew')
         server = ViewerServer(
@@ -143,6 +146,7 @@ def serve():
             calibrate=lambda: measured,
             watched=lambda: None,
             report=lambda sentence, trace: faults.append(trace),
+            tls=tls,
         )
         server.start()
         projection = described(surface, wraps)
@@ -357,6 +361,109 @@ def test_the_map_of_a_closed_panorama_leads_across_its_edge(browser, serve):
     for x in (1, width - 1):
         shown_deg = page.point('map', x, height / 2)
         assert aside_deg(shown_deg, BEHIND_DEG) == pytest.approx(0, abs=2 * CLOSE_DEG)
+
+
+@pytest.fixture
+def before_the_page(browser):
+    """Return a function that has JavaScript run in every page before the page's own."""
+    scripts = []
+
+    def add(source):
+        answer = browser.execute_cdp_cmd(
+            'Page.addScriptToEvaluateOnNewDocument', {'source': source}
+        )
+        scripts.append(answer)
+
+    yield add
+    for script in scripts:
+        browser.execute_cdp_cmd('Page.removeScriptToEvaluateOnNewDocument', script)
+
+
+def format_of(page):
+    """Return how pictures come, and what stands in the way of H.264."""
+    page.until(lambda: page.text('condition') == 'Live', 'a live picture')
+    return page.text('format'), page.find('format').get_attribute('title')
+
+
+@pytest.mark.parametrize('size', [(1300, 560), (1301, 561)], ids=['even', 'odd'])
+def test_h264_shows_what_was_painted_where_it_is(browser, serve, size):
+    surface = Surface('cylindrical', *size, 240.0, 640.0, 260.0)
+    for bearing_deg in (-120.0, 0.0, 140.0):
+        server = serve(surface, painted(surface, bearing_deg, 12.0))
+        page = Page(browser, server.url)
+        assert format_of(page) == ('H.264', '')
+        shown_deg = page.point('whole', *patch(page, 'whole', MAGENTA).mean(axis=0))
+        assert shown_deg == pytest.approx(bearing_deg, abs=CLOSE_DEG)
+
+
+@pytest.mark.parametrize(
+    ('script', 'reason'),
+    [
+        ('delete window.VideoDecoder', 'this browser has no WebCodecs'),
+        (
+            'VideoDecoder.isConfigSupported = async () => ({ supported: false })',
+            'this browser does not decode H.264',
+        ),
+        (
+            'VideoDecoder.prototype.decode = () => { throw new Error("worn out"); }',
+            'this browser failed to decode H.264: worn out',
+        ),
+    ],
+)
+def test_a_browser_that_cannot_show_h264_shows_jpeg_and_says_why(
+    browser, serve, before_the_page, script, reason
+):
+    before_the_page(script)
+    server = serve(SURFACES[0], painted(SURFACES[0], 31.0, 12.0))
+    page = Page(browser, server.url)
+    page.until(lambda: page.text('format') == 'JPEG', 'JPEG')
+    assert format_of(page) == ('JPEG', reason)
+    shown_deg = page.point('whole', *patch(page, 'whole', MAGENTA).mean(axis=0))
+    assert shown_deg == pytest.approx(31.0, abs=CLOSE_DEG)
+
+
+def test_a_picture_that_cannot_be_decoded_is_made_good_by_a_keyframe(
+    browser, serve, before_the_page
+):
+    before_the_page("""
+        const plain = VideoDecoder.prototype.decode;
+        window.decoded = [];
+        VideoDecoder.prototype.decode = function decode(chunk) {
+          decoded.push(chunk.type);
+          if (decoded.length === 5) throw new Error('once');
+          plain.call(this, chunk);
+        };
+    """)
+    server = serve(SURFACES[0], painted(SURFACES[0], 31.0, 12.0))
+    page = Page(browser, server.url)
+    page.until(lambda: len(browser.execute_script('return decoded')) > 8, 'more pictures')
+    kinds = browser.execute_script('return decoded')
+    assert kinds[:7] == ['key', 'delta', 'delta', 'delta', 'delta', 'key', 'delta']
+    assert format_of(page) == ('H.264', '')
+
+
+@pytest.mark.parametrize('is_encrypted', [False, True])
+def test_other_machines_need_https_for_h264(browser, serve, is_encrypted, tmp_path, monkeypatch):
+    monkeypatch.setenv('ROS_HOME', str(tmp_path))
+    tls = tls_of(ViewerSettings(https=is_encrypted), ())
+    if is_loopback(reachable('0.0.0.0')):
+        pytest.skip('this machine has no address but its own')
+    server = serve(SURFACES[0], painted(SURFACES[0], 31.0, 12.0), tls=tls, host='0.0.0.0')
+    page = Page(browser, server.url)
+    expected = ('H.264', '') if is_encrypted else ('JPEG', 'this page was not opened by https')
+    assert format_of(page) == expected
+
+
+def test_the_delay_is_told_and_coloured(browser, serve):
+    server = serve(SURFACES[0], painted(SURFACES[0], 0, 0))
+    page = Page(browser, server.url)
+    page.until(lambda: page.text('condition') == 'Live', 'a live picture')
+    for delay_ms, level in ((-5000, ''), (200, 'warning'), (5000, 'error'), (-5000, '')):
+        server.tell(delay_ms=delay_ms)
+        page.until(
+            lambda level=level: page.find('delay').get_attribute('data-level') == level,
+            f'{delay_ms} ms as {level or "good"}',
+        )
 
 
 def test_a_picture_that_stands_still_is_seen_to(browser, serve):

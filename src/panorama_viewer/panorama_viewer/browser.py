@@ -4,7 +4,6 @@ import asyncio
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
-from statistics import median
 from typing import Any
 
 from aiohttp import WSCloseCode, web
@@ -12,6 +11,7 @@ from aiohttp import WSCloseCode, web
 from fisheye_core.errors import VideoError
 from panorama_viewer.connection import Connection
 from panorama_viewer.feeds import JpegFeed, Picture, VideoFeed
+from panorama_viewer.way import Way
 
 DRAWN, HEARD = 'drawn', 'heard'
 """What a browser says when it has drawn a picture, and when it has heard the state."""
@@ -21,9 +21,6 @@ SILENT_S = 30.0
 """Over a link on which a picture takes longer nobody can drive; a page that is hidden has left."""
 _FAREWELL_S = 1.0
 """What a browser that takes nothing more may hold its end up."""
-_TOLD_S = 2.0
-"""What the delay is told of."""
-_ROUND_TRIPS = 20
 
 
 class Browser:
@@ -70,11 +67,9 @@ class Browser:
             except VideoError as error:
                 self._no_video = str(error)
         self._told: dict[str, Any] | None = None
-        self._told_s: deque[float] = deque()
         self._seen: Picture | None = None
         self._under_way: deque[Picture] = deque()
-        self._ways: deque[tuple[float, float]] = deque()
-        self._trips_s: deque[float] = deque(maxlen=_ROUND_TRIPS)
+        self._way = Way()
         self._silence: asyncio.TimerHandle | None = None
         self._words = {
             DRAWN: self._drawn,
@@ -130,19 +125,20 @@ class Browser:
         if self._under_way:
             now_s = _now_s()
             self._feed.drawn(now_s)
-            self._ways.append((now_s, now_s - self._under_way.popleft().came_s))
+            self._way.drawn(now_s, self._under_way.popleft().came_s)
             self._watch_silence()
             self.wake()
 
     def _heard(self) -> None:
-        if self._told_s:
-            self._trips_s.append(_now_s() - self._told_s.popleft())
+        self._way.heard(_now_s())
 
     def _restart(self) -> None:
         self._feed.restart()
 
-    def _give_up(self) -> None:
-        self._feed = JpegFeed()
+    def _give_up(self, reason: str = '') -> None:
+        """Go on with JPEG; a reason is for the page to show."""
+        self._feed, self._no_video, self._told = JpegFeed(), reason, None
+        self.wake()
 
     async def _farewell(self) -> None:
         await self._is_over.wait()
@@ -153,7 +149,7 @@ class Browser:
         state = self._state()
         if state is not self._told:
             self._told = state
-            self._told_s.append(_now_s())
+            self._way.told(_now_s())
             await self._stream.send_json({**state, **self._own_state()})
         picture = self._picture()
         if picture and picture is not self._seen and self._feed.takes(picture, _now_s()):
@@ -164,8 +160,7 @@ class Browser:
         try:
             data = await self._feed.coded(picture)
         except VideoError as error:
-            self._no_video = str(error)
-            self._feed = JpegFeed()
+            self._give_up(str(error))
             data = picture.jpeg
         if data:
             self._feed.sent(_now_s())
@@ -175,14 +170,8 @@ class Browser:
 
     def _own_state(self) -> dict[str, Any]:
         """Return what is true of this browser alone."""
-        now_s = _now_s()
-        while self._ways and now_s - self._ways[0][0] > _TOLD_S:
-            self._ways.popleft()
-        # A page answers a state at once: of what it takes, half is the answer's way.
-        back_s = min(self._trips_s, default=0.0) / 2
-        way_s = median(way_s for _, way_s in self._ways) - back_s if self._ways else 0.0
         return {
-            'way_ms': round(max(0.0, way_s) * 1e3),
+            'way_ms': round(self._way.usual_s(_now_s()) * 1e3),
             'format': self._feed.name,
             'no_video': self._no_video,
         }

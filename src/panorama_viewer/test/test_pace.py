@@ -19,8 +19,8 @@ class Page:
     Attributes
     ----------
     sent, drawn
-        (n, 2): when, s, and of pictures that were sent their kbit, of those that were drawn how old
-        they were, s.
+        (n, 2): when, s, and of pictures that were sent their kbit, of those that were drawn how
+        old they were, s.
     """
 
     def __init__(self, seed=1):
