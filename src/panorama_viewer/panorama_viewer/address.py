@@ -2,7 +2,7 @@
 
 import errno
 import socket
-from ipaddress import ip_address
+from ipaddress import ip_address, ip_network
 
 
 def is_loopback(host: str) -> bool:
@@ -32,3 +32,11 @@ def refusal(host: str, port: int, error: OSError | ValueError) -> str:
     if isinstance(error, OSError) and error.errno == errno.EADDRINUSE:
         return f'{where} is in use by another program; set the parameter port to a free one'
     return f'cannot serve on {where}: {getattr(error, "strerror", None) or error}'
+
+
+def source_of(address: str) -> str:
+    """Return what one client can connect from: an IPv4 address, or an IPv6 network."""
+    plain = ip_address(address.partition('%')[0])
+    if plain.version == 4:
+        return str(plain)
+    return str(plain.ipv4_mapped or ip_network((plain, 64), strict=False))

@@ -74,7 +74,7 @@ class Browser:
         self._words = {
             DRAWN: self._drawn,
             HEARD: self._heard,
-            RESTART: self._restart,
+            RESTART: lambda: self._feed.restart(),
             JPEG: self._give_up,
         }
 
@@ -131,9 +131,6 @@ class Browser:
 
     def _heard(self) -> None:
         self._way.heard(_now_s())
-
-    def _restart(self) -> None:
-        self._feed.restart()
 
     def _give_up(self, reason: str = '') -> None:
         """Go on with JPEG; a reason is for the page to show."""

@@ -12,11 +12,11 @@ from collections import Counter, OrderedDict
 from collections.abc import Callable
 from contextlib import suppress
 from errno import EADDRNOTAVAIL, EAFNOSUPPORT
-from ipaddress import ip_address, ip_network
 from itertools import islice
 
 from aiohttp import web
 
+from panorama_viewer.address import source_of
 from panorama_viewer.allowance import Allowance
 from panorama_viewer.connection import ANSWERED_WITHIN_S, Connection
 from panorama_viewer.faults import Faults
@@ -140,7 +140,7 @@ class Gate:
             self._loop.add_reader(listener, self._accept, listener)
 
     def _admit(self, taken: socket.socket, address: str) -> None:
-        source = _source(address)
+        source = source_of(address)
         if not self._allowance(source).take(1, self._loop.time()):
             self._refuse(taken)
             return
@@ -198,11 +198,3 @@ class Gate:
             oldest = next(c for c in self._strangers if c.source == source)
             del self._strangers[oldest]
             oldest.abort()
-
-
-def _source(address: str) -> str:
-    """Return what one client can connect from: an IPv4 address, or an IPv6 network."""
-    plain = ip_address(address.partition('%')[0])
-    if plain.version == 4:
-        return str(plain)
-    return str(plain.ipv4_mapped or ip_network((plain, 64), strict=False))
