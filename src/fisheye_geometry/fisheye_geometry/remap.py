@@ -12,12 +12,12 @@ from fisheye_geometry.band import Band, band_rows, bands_of
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.surface import Surface
 
-_INTERPOLATIONS = {
+INTERPOLATION_FLAGS = {
     'nearest': cv2.INTER_NEAREST,
     'linear': cv2.INTER_LINEAR,
     'cubic': cv2.INTER_CUBIC,
 }
-INTERPOLATIONS = tuple(_INTERPOLATIONS)
+INTERPOLATIONS = tuple(INTERPOLATION_FLAGS)
 
 _OUTSIDE_PX = -100
 """Far enough from the picture that no interpolation reaches it."""
@@ -61,7 +61,7 @@ class RemapTable:
         GeometryError
             For an interpolation that is not known.
         """
-        if interpolation not in _INTERPOLATIONS:
+        if interpolation not in INTERPOLATION_FLAGS:
             raise GeometryError(
                 f"interpolation '{interpolation}' is not known; "
                 f'expected one of {", ".join(INTERPOLATIONS)}'
@@ -69,7 +69,7 @@ class RemapTable:
         shape = surface.height, surface.width
         self.surface = surface
         self._input_shape = (source.height, source.width)
-        self._flag = _INTERPOLATIONS[interpolation]
+        self._flag = INTERPOLATION_FLAGS[interpolation]
         self.valid: np.ndarray = np.empty(shape, bool)
         self._pixels: np.ndarray = np.empty((*shape, 2), np.int16)
         self._fractions: np.ndarray | None = None

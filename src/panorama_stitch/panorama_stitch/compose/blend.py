@@ -12,6 +12,25 @@ _COARSEST_COLUMNS = 8
 _ALONE = 1e-4
 _UNIT = 1 << 14
 """A weight of 1, as an integer."""
+Fading = tuple[int, int] | np.ndarray | None
+"""Where one view gives way to the other: columns [begin, end) of a strip, None for all of them;
+or, where the seam is not upright, how far it has, (height, width) float32 from 0 to 1."""
+
+
+def ramp_over(shape: tuple[int, int], fade: Fading) -> np.ndarray:
+    """Return how far the left view has given way to the right one, (height, width) from 0 to 1."""
+    if isinstance(fade, np.ndarray):
+        return fade
+    begin, end = fade or (0, shape[1])
+    columns = np.arange(shape[1], dtype=np.float32) + 0.5 - begin
+    return np.broadcast_to((columns / max(end - begin, 1e-3)).clip(0, 1), shape)
+
+
+def columns_of(ramp: np.ndarray) -> tuple[int, int]:
+    """Return the columns [begin, end) of a ramp outside of which one view is alone."""
+    right, left = (ramp > 0).any(axis=0), (ramp < 1).any(axis=0)
+    begin = int(right.argmax()) if right.any() else ramp.shape[1]
+    return begin, ramp.shape[1] - int(left[::-1].argmax()) if left.any() else 0
 
 
 class Blend(Protocol):
@@ -50,7 +69,7 @@ class Blend(Protocol):
 
 
 class BlendKind(Protocol):
-    """Class of a blend, called with where each view shows anything and the seam's columns."""
+    """Class of a blend, called with where each view shows anything and where one fades."""
 
     needs_overlap: bool
 
@@ -58,7 +77,7 @@ class BlendKind(Protocol):
         self,
         left_seen: np.ndarray,
         right_seen: np.ndarray,
-        seam: tuple[int, int] | None = None,
+        fade: Fading = None,
         /,
     ) -> Blend:
         """Prepare the blend of a seam."""
@@ -73,7 +92,7 @@ class Feather:
         self,
         left_seen: np.ndarray,
         right_seen: np.ndarray,
-        fade: tuple[int, int] | None = None,
+        fade: Fading = None,
     ):
         """Prepare.
 
@@ -82,12 +101,10 @@ class Feather:
         left_seen, right_seen
             (height, width) bool: where each view shows anything; elsewhere the other is alone.
         fade
-            Columns [begin, end) of these in which one view gives way to the other; None: all.
+            Where one view gives way to the other.
         """
-        begin, end = fade or (0, left_seen.shape[1])
-        columns = np.arange(left_seen.shape[1], dtype=np.float32) + 0.5 - begin
         # Beyond the fade a view shows where it is alone, and so little elsewhere that nobody sees.
-        ramp = (columns / max(end - begin, 1e-3)).clip(_ALONE, 1 - _ALONE)
+        ramp = ramp_over(left_seen.shape, fade).clip(_ALONE, 1 - _ALONE)
         weights = left_seen * (1 - ramp), right_seen * ramp
         # Where no view shows anything it stays black with any weights.
         total = np.maximum(weights[0] + weights[1], np.finfo(np.float32).tiny)
@@ -133,15 +150,14 @@ class Multiband:
         self,
         left_seen: np.ndarray,
         right_seen: np.ndarray,
-        fade: tuple[int, int] | None = None,
+        fade: Fading = None,
     ):
         """Prepare; parameters as of `Feather`."""
-        height, width = left_seen.shape
-        begin, end = fade or (0, width)
+        ramp = ramp_over(left_seen.shape, fade)
+        fading_px = int(((ramp > 0) & (ramp < 1)).sum(axis=1).max(initial=1))
         self._alone = Alone(left_seen, right_seen)
-        left_half = np.tile(np.arange(width) < (begin + end) / 2, (height, 1))
-        self._weights = [left_half.astype(np.float32)]
-        for _ in range(max(1, int(log2(max(1, end - begin) / _COARSEST_COLUMNS)))):
+        self._weights = [(ramp <= 0.5).astype(np.float32)]
+        for _ in range(max(1, int(log2(max(1, fading_px) / _COARSEST_COLUMNS)))):
             self._weights.append(cv2.pyrDown(self._weights[-1]))
         self._levels: list[_Level] = []
         self._shape: tuple[int, ...] = ()

@@ -33,6 +33,8 @@ class Compositor:
         What it was made from.
     views
         Of the cameras in the rig's order.
+    blend
+        What blends its seams.
     is_costly
         Whether economy leaves anything out.
     """
@@ -58,8 +60,9 @@ class Compositor:
         self.layout = layout
         self.gain = gain
         self.views = tuple(p.view for p in sorted(placed.views, key=lambda view: view.index))
+        self.blend = BLENDS[blend].kind
         self._fades = [
-            Fade(layout, seam, pair, BLENDS[blend].kind)
+            Fade(layout, seam, pair, self.blend)
             for seam, pair in zip(layout.seams, neighbours(placed), strict=True)
         ]
         self.is_costly = any(fade.is_costly for fade in self._fades)
@@ -106,16 +109,25 @@ class Compositor:
         ImageFormatError
             If a picture has not the size that its view was made for.
         """
-        # Where grey pictures came in place of colour, a gain for them is still to be made.
-        gain = self.gain if self.gain and self.gain.channels == out[0, 0].size else None
-        if gain and are_live:
-            gain.update(images)
+        gain = self.gain_for(out)
+        if are_live:
+            self.expose(images)
         for fade in self._fades:
             fade.expect(out)
         run_parallel([partial(self._draw, parts, images, out, gain) for parts in self._parts])
         for fade in self._fades:
             if not fade.is_local:
                 fade.blend(_ALL_ROWS, out, economical=economical or not are_live)
+
+    def expose(self, images: Sequence[np.ndarray]) -> None:
+        """Let the gain follow live pictures, one of each camera; `compose` does so by itself."""
+        if gain := self.gain_for(images[0]):
+            gain.update(images)
+
+    def gain_for(self, image: np.ndarray) -> GainCompensation | None:
+        """Return what evens out the brightness of pictures with the channels of this one."""
+        # Where grey pictures came in place of colour, a gain for them is still to be made.
+        return self.gain if self.gain and self.gain.channels == image[0, 0].size else None
 
     def _prepare(self, placed: Placed, parts: list['_Part'], rows: slice) -> None:
         """Cut the tables of some rows: each view after its left neighbour, over which it fades."""

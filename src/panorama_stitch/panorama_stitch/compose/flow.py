@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from fisheye_core.parallel import run_parallel
-from panorama_stitch.compose.blend import Alone, Feather
+from panorama_stitch.compose.blend import Alone, Fading, Feather, columns_of, ramp_over
 from panorama_stitch.compose.optical_flow import OpticalFlow
 
 _ROUNDS = 3
@@ -43,23 +43,23 @@ class Flow:
         self,
         left_seen: np.ndarray,
         right_seen: np.ndarray,
-        fade: tuple[int, int] | None = None,
+        fade: Fading = None,
     ):
         """Prepare; parameters as of `Feather`, the views warp in all columns."""
         height, width = shape = left_seen.shape
-        fade = fade or (0, width)
         self._feather = Feather(left_seen, right_seen, fade)
         self._alone = Alone(left_seen, right_seen)
-        self._fade = slice(*fade)
-        ramp = (np.arange(fade[1] - fade[0], dtype=np.float32) + 0.5) / max(1, fade[1] - fade[0])
-        self._weights = [np.tile(weight, (height, 1)) for weight in (1 - ramp, ramp)]
+        ramp = ramp_over(shape, fade)
+        self._fade = slice(*columns_of(ramp))
+        fading = ramp[:, self._fade]
+        self._weights = [np.ascontiguousarray(weight) for weight in (1 - fading, fading)]
 
         self._flow = flow = OpticalFlow(width, height)
         both = flow.reduced((left_seen & right_seen).astype(np.float32))
         way = np.zeros_like(flow.grid)
         way[flow.inner] = _way(both[flow.inner] > 0.5)[..., None]
-        self._left = _Warp(flow, way, shape, slice(0, fade[1]))
-        self._right = _Warp(flow, 1 - way, shape, slice(fade[0], width))
+        self._left = _Warp(flow, way, shape, slice(0, self._fade.stop))
+        self._right = _Warp(flow, 1 - way, shape, slice(self._fade.start, width))
         # What one view does not show must not be drawn to where both show something.
         inside = cv2.erode(both, np.ones((_EDGE_SIDE, _EDGE_SIDE)))
         inside = cv2.blur(inside, (_EDGE_SIDE, _EDGE_SIDE))

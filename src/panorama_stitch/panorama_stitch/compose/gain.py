@@ -122,6 +122,8 @@ class _Multiplier:
 
     def __call__(self, drawn: np.ndarray) -> None:
         if not self._is_grey:
+            if drawn.shape[1] > self._weights.shape[1]:  # a view is wider than the panorama
+                self._weights = np.repeat(self._weights[:, :1], drawn.shape[1], axis=1)
             for top in range(0, len(drawn), _ROWS):
                 part = drawn[top : top + _ROWS]
                 cv2.multiply(

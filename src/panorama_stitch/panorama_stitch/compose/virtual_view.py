@@ -1,0 +1,249 @@
+"""The picture of a virtual camera, drawn straight from the pictures of a rig's cameras."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from fisheye_core.errors import GeometryError
+from fisheye_geometry.attitude import Attitude
+from fisheye_geometry.mesh import Mesh, MeshTable
+from fisheye_geometry.remap import on_picture
+from fisheye_geometry.surface import Surface
+from panorama_stitch.compose.blend import Blend, Feather
+from panorama_stitch.compose.compositor import Compositor
+from panorama_stitch.compose.layout import Layout
+from panorama_stitch.compose.shares import (
+    Box,
+    Joint,
+    Seen,
+    box_of,
+    distance_px,
+    joints,
+    owners,
+    ramps,
+    united,
+)
+from panorama_stitch.compose.view import Cut, View
+
+_PROBES = 9
+"""Pixels a side of the grid by which cameras are told that see nothing of a picture."""
+
+
+def check_bearings(compositor: Compositor) -> None:
+    """Raise a `GeometryError` where it is not known where the cameras of a panorama look."""
+    surface = compositor.layout.surface
+    if not surface.yaw_is_column_shift:
+        raise GeometryError(
+            f'views are not drawn beside a {surface.kind} panorama, which does not tell where its '
+            'cameras look; expected surface:=cylindrical or equirectangular'
+        )
+    if any(view.shift_px[0] for view in compositor.views):
+        raise GeometryError(
+            'views are not drawn: no overlap was found, and it is not known where the cameras look'
+        )
+
+
+class VirtualView:
+    """Draws what a virtual camera sees, with the seams, the blend and the gain of the panorama.
+
+    Attributes
+    ----------
+    cameras : tuple of int
+        Indices of the cameras that show something of it.
+    seen_share : float
+        Share of the picture that shows anything; the rest is black.
+    """
+
+    def __init__(
+        self, compositor: Compositor, surface: Surface, attitude: Attitude, *, moves: bool = False
+    ):
+        """Prepare.
+
+        Parameters
+        ----------
+        compositor
+            What composes the panorama.
+        surface
+            Rectilinear: the picture to be drawn.
+        attitude
+            Takes rays of the picture to rays of the panorama.
+        moves
+            Whether it will look elsewhere soon: it is prepared in the time of a few frames then,
+            seams only fade, and it ends up to 8 px earlier where a lens does.
+
+        Raises
+        ------
+        GeometryError
+            As `check_bearings` does.
+        """
+        check_bearings(compositor)
+        self._compositor = compositor
+        layout = compositor.layout
+        shape = surface.height, surface.width
+        tables, seen = _tables(compositor.views, surface, attitude, moves)
+        distances = _distances(layout, surface, attitude, moves)
+        faded = ramps(layout, distances)
+        owner = owners(layout, faded, seen) if seen else np.full(shape, -1, np.int8)
+        kind = Feather if moves else compositor.blend
+        found = (
+            joints(layout, distances, faded, seen, owner, needs_overlap=kind.needs_overlap)
+            if seen
+            else []
+        )
+        self._parts = _parts(tables, owner, found)
+        self._blends = [_JointBlend(joint, kind(*joint.seen, joint.ramp)) for joint in found]
+        self.cameras = tuple(self._parts)
+        self.seen_share = float((owner >= 0).mean())
+
+    def draw(
+        self,
+        images: Sequence[np.ndarray],
+        out: np.ndarray,
+        *,
+        without: Collection[int] = (),
+        economical: bool = False,
+    ) -> None:
+        """Draw.
+
+        Parameters
+        ----------
+        images
+            A picture of each camera, (height, width[, channels]) uint8.
+        out
+            (surface.height, surface.width[, channels]) uint8, overwritten.
+        without
+            Indices of cameras that are not shown; it is black there.
+        economical
+            Leave out what takes long in blends.
+
+        Raises
+        ------
+        ImageFormatError
+            If a picture has not the size of its camera's.
+        """
+        gain = self._compositor.gain_for(out)
+        whole = out.shape[:2]
+        parts = {index: part for index, part in self._parts.items() if index not in without}
+        if not any(part.covers(whole) for part in parts.values()):
+            out[:] = 0
+        drawn = {}
+        for index, part in parts.items():
+            room = out if part.covers(whole) else part.room(out)
+            part.cut(images[index], room)
+            if gain:
+                gain.apply(index, room)
+            if room is not out:
+                cv2.copyTo(room, part.mask, out[part.box])
+            drawn[index] = room
+        for joint in self._blends:
+            if joint.left in drawn and joint.right in drawn:
+                joint.draw(self._parts, drawn, out, economical=economical)
+
+
+class _Part:
+    """How one camera is drawn: a box of the picture, and where in it the camera is shown."""
+
+    def __init__(self, cut: Cut, box: Box, mask: np.ndarray):
+        self.cut, self.box, self.mask = cut, box, mask
+        self._is_full = bool(mask.all())
+        self._room = np.empty(0, np.uint8)
+
+    def covers(self, shape: tuple[int, int]) -> bool:
+        """Whether the camera shows all of a picture (height, width)."""
+        return self._is_full and self.mask.shape == shape
+
+    def room(self, out: np.ndarray) -> np.ndarray:
+        """Return memory for the box, kept from frame to frame."""
+        shape = self.mask.shape + out.shape[2:]
+        if self._room.shape != shape:
+            self._room = np.empty(shape, np.uint8)
+        return self._room
+
+    def inner(self, box: Box) -> Box:
+        """Return where a box of the picture lies in this one."""
+        top, left = self.box[0].start, self.box[1].start
+        return (
+            slice(box[0].start - top, box[0].stop - top),
+            slice(box[1].start - left, box[1].stop - left),
+        )
+
+
+class _JointBlend(NamedTuple):
+    """A seam, and what blends it."""
+
+    joint: Joint
+    blend: Blend
+
+    @property
+    def left(self) -> int:
+        return self.joint.left
+
+    @property
+    def right(self) -> int:
+        return self.joint.right
+
+    def draw(self, parts: dict[int, _Part], drawn, out: np.ndarray, *, economical: bool) -> None:
+        """Blend what is drawn of the two cameras into the picture."""
+        joint = self.joint
+        left, right = (
+            np.ascontiguousarray(drawn[index][parts[index].inner(joint.box)])
+            for index in (joint.left, joint.right)
+        )
+        self.blend(left, right, economical=economical)
+        cv2.copyTo(right, joint.mask, out[joint.box])
+
+
+def _tables(views: Sequence[View], surface: Surface, attitude: Attitude, moves: bool):
+    """Return the tables of the cameras that see anything of a picture, and where they see it."""
+    tables: dict[int, Cut] = {}
+    seen: dict[int, Seen] = {}
+    y, x = np.ogrid[
+        -0.5 : surface.height - 0.5 : _PROBES * 1j, -0.5 : surface.width - 0.5 : _PROBES * 1j
+    ]
+    for index, view in enumerate(views):
+        turned = Attitude.of(attitude.matrix.T @ view.attitude.matrix)
+        if not on_picture(view.source, surface.rays(x, y) @ turned.matrix)[1].any():
+            continue
+        view = replace(view, attitude=turned, shift_px=(0.0, 0.0))
+        table = (
+            MeshTable(view.source, surface, view.interpolation, turned)
+            if moves
+            else view.drawn_on(surface)
+        )
+        shows, scene = view.shows(table), view.shows_scene(table)
+        if shows.any():
+            tables[index], seen[index] = table, Seen(shows, scene)
+    return tables, seen
+
+
+def _distances(layout: Layout, surface: Surface, attitude: Attitude, moves: bool):
+    """Return how far right of each seam of the panorama the pixels of a picture look, px."""
+    mesh = Mesh(*surface.size) if moves else None
+    y, x = (mesh.y_px, mesh.x_px) if mesh else np.ogrid[: surface.height, : surface.width]
+    pixels, _ = layout.surface.project(surface.rays(x, y) @ attitude.matrix.T)
+    distances = [distance_px(pixels[..., 0], seam, layout) for seam in layout.seams]
+    if mesh is None:
+        return [distance.astype(np.float32) for distance in distances]
+    spread = []
+    for distance in distances:
+        # Behind, from one end to the other, it is no seam that lies between far left and right.
+        near, far = mesh.spread(distance), mesh.spread(np.abs(distance))
+        is_far = far > layout.surface.circumference_px / 4
+        spread.append(np.where(is_far, np.copysign(far, near), near))
+    return spread
+
+
+def _parts(tables: dict[int, Cut], owner: np.ndarray, found: Sequence[Joint]) -> dict[int, _Part]:
+    parts = {}
+    for index, table in tables.items():
+        mine = owner == index
+        boxes = [joint.box for joint in found if index in (joint.left, joint.right)]
+        if own := box_of(mine):
+            boxes.append(own)
+        if boxes:
+            box = united(boxes)
+            parts[index] = _Part(table.part(*box), box, mine[box].astype(np.uint8))
+    return parts
