@@ -42,6 +42,7 @@ ROS = {
     'fisheye_msgs',
     'geometry_msgs',
     'std_srvs',
+    'tf2_msgs',
     'fisheye_bridge',
 }
 KEYS = {

@@ -44,6 +44,7 @@ class ImagePublisher:
     """Publishes a picture raw and, on the `compressed` sub-topic, as JPEG; each only if wanted."""
 
     def __init__(self, node: Node, topic: str):
+        self._node = node
         self._raw = node.create_publisher(Image, topic, IMAGE)
         self._jpeg = node.create_publisher(CompressedImage, f'{topic}/compressed', IMAGE)
         self._buffer: ImageBuffer | None = None
@@ -52,6 +53,11 @@ class ImagePublisher:
     def wanted(self) -> bool:
         """Whether anybody subscribes."""
         return bool(self._raw.get_subscription_count() or self._jpeg.get_subscription_count())
+
+    def destroy(self) -> None:
+        """End the topics."""
+        for publisher in (self._raw, self._jpeg):
+            self._node.destroy_publisher(publisher)
 
     def publish(self, message: Image, image: np.ndarray, jpeg_quality: int) -> None:
         """Publish a message; `image` is the array (height, width[, 3]) of its pixels."""

@@ -32,12 +32,12 @@ class Background:
             self._on_error(error)
             raise
         except BaseException as error:
-            bug = _bug(error)
+            bug = bug_of(error)
             self._on_error(bug)
             raise bug from error
 
 
-def _bug(error: BaseException) -> BugError:
+def bug_of(error: BaseException) -> BugError:
     """Return a sentence about what no code expected: only this job is left undone."""
     place = extract_tb(error.__traceback__)[-1]
     return BugError(

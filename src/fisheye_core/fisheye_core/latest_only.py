@@ -5,6 +5,9 @@ from collections.abc import Callable
 from threading import Condition, Thread
 from typing import Generic, TypeVar
 
+from fisheye_core.background import bug_of
+from fisheye_core.errors import FisheyeError
+
 _Item = TypeVar('_Item')
 
 
@@ -52,9 +55,28 @@ class LatestOnlyQueue(Generic[_Item]):
 class LatestOnlyWorker(Generic[_Item]):
     """A thread that works on the newest items and never falls behind."""
 
-    def __init__(self, work: Callable[[_Item], None], name: str, waiting: int = 1):
-        """Start; at most `waiting` items wait while one is in work."""
-        self._work = work
+    def __init__(
+        self,
+        work: Callable[[_Item], None],
+        name: str,
+        waiting: int = 1,
+        on_error: Callable[[FisheyeError], None] | None = None,
+    ):
+        """Start.
+
+        Parameters
+        ----------
+        work
+            Called with each item, in the thread.
+        name
+            Of the thread.
+        waiting
+            At most so many items wait while one is in work.
+        on_error
+            Called with the `FisheyeError` of an item, a bug as a `BugError`, after which the
+            worker goes on; None: an error ends the worker.
+        """
+        self._work, self._on_error = work, on_error
         self._queue: LatestOnlyQueue[_Item] = LatestOnlyQueue(waiting)
         self._thread = Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
@@ -75,4 +97,9 @@ class LatestOnlyWorker(Generic[_Item]):
 
     def _run(self) -> None:
         while (item := self._queue.get()) is not None:
-            self._work(item)
+            try:
+                self._work(item)
+            except BaseException as error:
+                if self._on_error is None:
+                    raise
+                self._on_error(error if isinstance(error, FisheyeError) else bug_of(error))

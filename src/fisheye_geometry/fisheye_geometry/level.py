@@ -106,6 +106,16 @@ def levelled(
     return [extra.matrix @ ahead @ attitude for attitude in level]
 
 
+def level_turn(down: np.ndarray) -> np.ndarray:
+    """Return the rotation (3, 3) that levels a frame in which a direction (3,) is down.
+
+    What is ahead, z, keeps its bearing.
+    """
+    upright = _upright(down)
+    x, _, z = upright[:, 2]
+    return rotation_matrix(-atan2(x, z) * DOWN) @ upright
+
+
 def _upright(down: np.ndarray) -> np.ndarray:
     """Return the smallest rotation (3, 3) that takes a direction (3,) to `DOWN`."""
     down = down / np.linalg.norm(down)

@@ -45,7 +45,9 @@ WIDE = synthetic_lens(960, 720, np.radians(210))
 def rig_of(attitudes, *, is_closed=False, lens=LENS, **style):
     """Return what composes the panoramas of a known rig, and its pictures."""
     names = [f'camera{index}' for index in range(len(attitudes))]
-    cameras = tuple(RigCamera(*each) for each in zip(names, [lens] * len(names), attitudes))
+    cameras = tuple(
+        RigCamera(*each) for each in zip(names, [lens] * len(names), attitudes, strict=True)
+    )
     surface = PanoramaSettings().surface_of(lens)
     views = views_of_rig(Rig(cameras, is_closed), [surface] * len(names))
     images = [Scene().view(lens, attitude).frame(STAMP_NS) for attitude in attitudes]

@@ -7,30 +7,13 @@ from typing import Protocol
 import cv2
 import numpy as np
 
+from panorama_stitch.compose.ramp import Fading, ramp_over
+
 _COARSEST_COLUMNS = 8
 """A multiband blend halves its strip until so few columns are left to fade over."""
 _ALONE = 1e-4
 _UNIT = 1 << 14
 """A weight of 1, as an integer."""
-Fading = tuple[int, int] | np.ndarray | None
-"""Where one view gives way to the other: columns [begin, end) of a strip, None for all of them;
-or, where the seam is not upright, how far it has, (height, width) float32 from 0 to 1."""
-
-
-def ramp_over(shape: tuple[int, int], fade: Fading) -> np.ndarray:
-    """Return how far the left view has given way to the right one, (height, width) from 0 to 1."""
-    if isinstance(fade, np.ndarray):
-        return fade
-    begin, end = fade or (0, shape[1])
-    columns = np.arange(shape[1], dtype=np.float32) + 0.5 - begin
-    return np.broadcast_to((columns / max(end - begin, 1e-3)).clip(0, 1), shape)
-
-
-def columns_of(ramp: np.ndarray) -> tuple[int, int]:
-    """Return the columns [begin, end) of a ramp outside of which one view is alone."""
-    right, left = (ramp > 0).any(axis=0), (ramp < 1).any(axis=0)
-    begin = int(right.argmax()) if right.any() else ramp.shape[1]
-    return begin, ramp.shape[1] - int(left[::-1].argmax()) if left.any() else 0
 
 
 class Blend(Protocol):

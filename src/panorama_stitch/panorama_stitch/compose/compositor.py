@@ -12,7 +12,7 @@ from fisheye_core.parallel import run_parallel
 from panorama_stitch.compose.blends import BLENDS
 from panorama_stitch.compose.fade import Fade
 from panorama_stitch.compose.gain import GainCompensation
-from panorama_stitch.compose.layout import Layout, neighbours, wrapped
+from panorama_stitch.compose.layout import Layout, neighbours, pieces, wrapped
 from panorama_stitch.compose.placed import Placed, PlacedView
 from panorama_stitch.compose.view import Cut
 
@@ -195,11 +195,3 @@ class _Part(NamedTuple):
     cut: Cut | None
     keep: Fade | None = None
     blend: Fade | None = None
-
-
-def pieces(columns: tuple[int, int], seen: tuple[int, int]) -> list[tuple[int, int, bool]]:
-    """Cut columns into those before, in and after some others, and tell which are in them."""
-    begin, end = columns
-    edges = [begin, *(min(max(edge, begin), end) for edge in seen), end]
-    cuts = zip(pairwise(edges), (False, True, False), strict=True)
-    return [(first, last, is_in) for (first, last), is_in in cuts if last > first]

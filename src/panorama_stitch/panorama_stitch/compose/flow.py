@@ -11,8 +11,9 @@ import cv2
 import numpy as np
 
 from fisheye_core.parallel import run_parallel
-from panorama_stitch.compose.blend import Alone, Fading, Feather, columns_of, ramp_over
+from panorama_stitch.compose.blend import Alone, Feather
 from panorama_stitch.compose.optical_flow import OpticalFlow
+from panorama_stitch.compose.ramp import Fading, columns_of, ramp_over
 
 _ROUNDS = 3
 """Of the fixed point that finds what part of a view comes to lie at a pixel."""

@@ -109,7 +109,7 @@ class _Multiplier:
     """Multiplies drawn rows; faster where all channels have the same factor."""
 
     def __init__(self, width: int, channels: int):
-        self._weights = np.full((_ROWS, width, channels), 255, np.uint8)
+        self._weights: np.ndarray = np.full((_ROWS, width, channels), 255, np.uint8)
         self._scale = 1.0
         self._is_grey = True
 

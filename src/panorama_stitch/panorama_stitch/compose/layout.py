@@ -192,3 +192,11 @@ def visible(layout: Layout, view: PlacedView) -> tuple[int, int]:
     """Columns [begin, end) in which a view is drawn and may show something."""
     (begin, end), x = layout.drawn(view.index), layout.origin[0]
     return max(begin, view.begin - x), min(end, view.end - x)
+
+
+def pieces(columns: tuple[int, int], seen: tuple[int, int]) -> list[tuple[int, int, bool]]:
+    """Cut columns into those before, in and after some others, and tell which are in them."""
+    begin, end = columns
+    edges = [begin, *(min(max(edge, begin), end) for edge in seen), end]
+    cuts = zip(pairwise(edges), (False, True, False), strict=True)
+    return [(first, last, is_in) for (first, last), is_in in cuts if last > first]

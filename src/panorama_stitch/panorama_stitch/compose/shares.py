@@ -91,7 +91,7 @@ def owners(layout: Layout, faded: Sequence[np.ndarray], seen: dict[int, Seen]) -
     for at, index in enumerate(layout.order):
         if index not in seen:
             continue
-        weight = np.float32(1)
+        weight = np.ones(shape, np.float32)
         if faded and (at or layout.wraps):
             weight = weight * faded[at - 1]
         if faded and (at < last or layout.wraps):

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import pi
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -15,6 +15,26 @@ from fisheye_geometry.surface import Surface
 
 Cut = Callable[..., Any]
 """Draws a part of a panorama: takes the camera's image and, if given, the array for it."""
+
+
+class Table(Protocol):
+    """Draws what a surface shows of a view.
+
+    Attributes
+    ----------
+    valid
+        (height, width) bool: where it shows anything.
+    """
+
+    valid: np.ndarray
+
+    def part(self, rows: slice, columns: slice) -> 'Table':
+        """Prepare to draw a part of it."""
+
+    def __call__(self, image: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
+        """Draw the camera's image."""
+
+
 _STEEP_RAD = np.radians(60)
 """A camera that looks up or down by more has no sides."""
 _SAME_FOCAL_PX = 1e-6
@@ -60,7 +80,7 @@ class View:
         floor = valid if image.ndim == 2 else np.repeat(valid[..., None], image.shape[2], axis=2)
         return np.maximum(corrected, floor, out=corrected)
 
-    def drawn_on(self, surface: Surface) -> 'RemapTable | Copy':
+    def drawn_on(self, surface: Surface) -> Table:
         """Prepare to draw what a surface, perhaps a window of the panorama's, shows of the view.
 
         Corrected pictures of the same scale are copied, to whole pixels.
@@ -102,11 +122,11 @@ class View:
         up, down = np.arctan2(rays[:, 1], rays[:, 2]) * (-1, 1)
         return float(sides[0]), float(sides[1]), float(up), float(down)
 
-    def shows(self, table: 'RemapTable | Copy') -> np.ndarray:
+    def shows(self, table: 'Table') -> np.ndarray:
         """(height, width) bool: where a table of this view shows anything."""
         return table.valid if self.seen is None else shown(self.seen, table, table.valid.shape)
 
-    def shows_scene(self, table: 'RemapTable | Copy') -> np.ndarray:
+    def shows_scene(self, table: 'Table') -> np.ndarray:
         """(height, width) bool: where a table of this view shows anything but the robot itself."""
         valid = self.shows(table)
         if self.body is not None:

@@ -2,7 +2,6 @@
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -12,21 +11,18 @@ from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.mesh import Mesh, MeshTable
 from fisheye_geometry.remap import on_picture
 from fisheye_geometry.surface import Surface
-from panorama_stitch.compose.blend import Blend, Feather
+from panorama_stitch.compose.blend import Feather
 from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.compose.layout import Layout
 from panorama_stitch.compose.shares import (
-    Box,
-    Joint,
     Seen,
-    box_of,
     distance_px,
     joints,
     owners,
     ramps,
-    united,
 )
-from panorama_stitch.compose.view import Cut, View
+from panorama_stitch.compose.view import Table, View
+from panorama_stitch.compose.virtual_parts import JointBlend, parts_of
 
 _PROBES = 9
 """Pixels a side of the grid by which cameras are told that see nothing of a picture."""
@@ -93,8 +89,8 @@ class VirtualView:
             if seen
             else []
         )
-        self._parts = _parts(tables, owner, found)
-        self._blends = [_JointBlend(joint, kind(*joint.seen, joint.ramp)) for joint in found]
+        self._parts = parts_of(tables, owner, found)
+        self._blends = [JointBlend(joint, kind(*joint.seen, joint.ramp)) for joint in found]
         self.cameras = tuple(self._parts)
         self.seen_share = float((owner >= 0).mean())
 
@@ -143,62 +139,9 @@ class VirtualView:
                 joint.draw(self._parts, drawn, out, economical=economical)
 
 
-class _Part:
-    """How one camera is drawn: a box of the picture, and where in it the camera is shown."""
-
-    def __init__(self, cut: Cut, box: Box, mask: np.ndarray):
-        self.cut, self.box, self.mask = cut, box, mask
-        self._is_full = bool(mask.all())
-        self._room = np.empty(0, np.uint8)
-
-    def covers(self, shape: tuple[int, int]) -> bool:
-        """Whether the camera shows all of a picture (height, width)."""
-        return self._is_full and self.mask.shape == shape
-
-    def room(self, out: np.ndarray) -> np.ndarray:
-        """Return memory for the box, kept from frame to frame."""
-        shape = self.mask.shape + out.shape[2:]
-        if self._room.shape != shape:
-            self._room = np.empty(shape, np.uint8)
-        return self._room
-
-    def inner(self, box: Box) -> Box:
-        """Return where a box of the picture lies in this one."""
-        top, left = self.box[0].start, self.box[1].start
-        return (
-            slice(box[0].start - top, box[0].stop - top),
-            slice(box[1].start - left, box[1].stop - left),
-        )
-
-
-class _JointBlend(NamedTuple):
-    """A seam, and what blends it."""
-
-    joint: Joint
-    blend: Blend
-
-    @property
-    def left(self) -> int:
-        return self.joint.left
-
-    @property
-    def right(self) -> int:
-        return self.joint.right
-
-    def draw(self, parts: dict[int, _Part], drawn, out: np.ndarray, *, economical: bool) -> None:
-        """Blend what is drawn of the two cameras into the picture."""
-        joint = self.joint
-        left, right = (
-            np.ascontiguousarray(drawn[index][parts[index].inner(joint.box)])
-            for index in (joint.left, joint.right)
-        )
-        self.blend(left, right, economical=economical)
-        cv2.copyTo(right, joint.mask, out[joint.box])
-
-
 def _tables(views: Sequence[View], surface: Surface, attitude: Attitude, moves: bool):
     """Return the tables of the cameras that see anything of a picture, and where they see it."""
-    tables: dict[int, Cut] = {}
+    tables: dict[int, Table] = {}
     seen: dict[int, Seen] = {}
     y, x = np.ogrid[
         -0.5 : surface.height - 0.5 : _PROBES * 1j, -0.5 : surface.width - 0.5 : _PROBES * 1j
@@ -234,16 +177,3 @@ def _distances(layout: Layout, surface: Surface, attitude: Attitude, moves: bool
         is_far = far > layout.surface.circumference_px / 4
         spread.append(np.where(is_far, np.copysign(far, near), near))
     return spread
-
-
-def _parts(tables: dict[int, Cut], owner: np.ndarray, found: Sequence[Joint]) -> dict[int, _Part]:
-    parts = {}
-    for index, table in tables.items():
-        mine = owner == index
-        boxes = [joint.box for joint in found if index in (joint.left, joint.right)]
-        if own := box_of(mine):
-            boxes.append(own)
-        if boxes:
-            box = united(boxes)
-            parts[index] = _Part(table.part(*box), box, mine[box].astype(np.uint8))
-    return parts

@@ -8,6 +8,7 @@ from fisheye_msgs.msg import Overlaps, Projection
 from fisheye_msgs.srv import CalibrateOverlap
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
+from rclpy.subscription import Subscription
 from sensor_msgs.msg import Imu
 
 from fisheye_bridge.awaiting import awaitable
@@ -19,7 +20,7 @@ from fisheye_bridge.diagnostics import (
     OverloadMonitor,
     Report,
 )
-from fisheye_bridge.imu import gravity_of
+from fisheye_bridge.imu import reading_of
 from fisheye_bridge.parameters import Parameters
 from fisheye_bridge.projection import projection_of
 from fisheye_bridge.qos import BEST_EFFORT_INPUT, LATCHED
@@ -31,6 +32,7 @@ from panorama_stitch.nodes.panorama_publisher import (
     PanoramaPublisher,
     header_of,
 )
+from panorama_stitch.nodes.views import Views
 from panorama_stitch.overlap.overlap_settings import METHODS
 from panorama_stitch.pipeline.metrics import (
     economy_sentence,
@@ -43,7 +45,6 @@ from panorama_stitch.pipeline.stitch_pipeline import StitchPipeline
 
 _ANSWER_S = 10.0
 """Nobody waits longer for the answer of a service; what was asked for is done nevertheless."""
-_SILENT_IMU_S = 2.0
 
 
 class PanoramaBase(Node):
@@ -63,6 +64,7 @@ class PanoramaBase(Node):
         self._panorama = PanoramaPublisher(self)
         self._projection = self.create_publisher(Projection, 'panorama/projection', LATCHED)
         self._overlaps = self.create_publisher(Overlaps, 'panorama/overlap', LATCHED)
+        self._views = Views(self, FRAME_ID)
         # A group of its own: while an answer is awaited, rclpy runs nothing else of its group.
         self.create_service(
             CalibrateOverlap,
@@ -70,8 +72,8 @@ class PanoramaBase(Node):
             self._calibrate,
             callback_group=MutuallyExclusiveCallbackGroup(),
         )
-        self._imu_s: float | None = None
-        self.create_subscription(Imu, 'imu', self._take_imu, BEST_EFFORT_INPUT)
+        self._imu: Subscription | None = None
+        self._follow_imu(declared.settings)
         self._diagnostics = Diagnostics(self, self._report)
         self._thread = Thread(target=self._publish_panoramas, name='compose', daemon=True)
         self._thread.start()
@@ -90,6 +92,7 @@ class PanoramaBase(Node):
         self.pipeline.stop()
         self._thread.join()
         self._panorama.stop()
+        self._views.stop()
         super().destroy_node()
 
     def warn(self, sentence: str) -> None:
@@ -98,31 +101,44 @@ class PanoramaBase(Node):
 
     def _apply(self, settings: PanoramaOutputSettings) -> None:
         self.pipeline.apply(settings)
+        self._follow_imu(settings)
+
+    def _follow_imu(self, settings: PanoramaOutputSettings) -> None:
+        """Subscribe while the level is the imu's: its messages come by the hundred a second."""
+        if settings.level == 'imu' and self._imu is None:
+            self._imu = self.create_subscription(Imu, 'imu', self._take_imu, BEST_EFFORT_INPUT)
+        elif settings.level != 'imu' and self._imu is not None:
+            self.destroy_subscription(self._imu)
+            self._imu = None
 
     def _take_imu(self, message: Imu) -> None:
-        gravity = gravity_of(message)
-        if gravity is not None:
-            self._imu_s = monotonic()
-            self.pipeline.set_gravity(gravity)
+        if reading := reading_of(message):
+            self.pipeline.feel(reading)
 
     def _publish_panoramas(self) -> None:
         """Publish each panorama that the pipeline has, until it is stopped."""
         while (panorama := self.pipeline.next()) is not None:
             begin_s = monotonic()
-            if panorama.compositor is not self._announced:
-                self._announce(panorama)
+            self._announce(panorama)
             self._handled += 1
-            self._panorama.publish(panorama, self.settings)
+            if not self._panorama.publish(panorama, self.settings) and self._views.wanted:
+                panorama.expose()
+            self._views.take(panorama)
             self.pipeline.leave_room(monotonic() - begin_s)
 
     def _announce(self, panorama: Panorama) -> None:
         """Publish what is in use from this panorama on, for those who come later too."""
-        self._announced = panorama.compositor
+        is_news = panorama.compositor is not self._announced
         header = header_of(panorama.stamp_ns)
         layout, rig = panorama.compositor.layout, self.pipeline.rig
-        self._projection.publish(projection_of(panorama.surface, header, wraps=layout.wraps))
-        overlaps = overlap_messages(self.pipeline.overlaps, rig, FRAME_ID, layout)
-        self._overlaps.publish(Overlaps(header=header, overlaps=overlaps))
+        if is_news or panorama.orientation:
+            level = {'orientation': panorama.orientation} if panorama.orientation else {}
+            projection = projection_of(panorama.surface, header, wraps=layout.wraps, **level)
+            self._projection.publish(projection)
+        if is_news:
+            self._announced = panorama.compositor
+            overlaps = overlap_messages(self.pipeline.overlaps, rig, FRAME_ID, layout)
+            self._overlaps.publish(Overlaps(header=header, overlaps=overlaps))
 
     async def _calibrate(self, request, response):
         try:
@@ -168,6 +184,7 @@ class PanoramaBase(Node):
             self._overload.tell(report, self._handled, pipeline.frames.overtaken)
         report.values.update(metrics(pipeline))
         self._panorama.report(report)
+        self._views.report(report)
 
     def _rig_faults(self) -> Iterator[str]:
         """Return what is wrong with the rig, in sentences."""
@@ -177,8 +194,5 @@ class PanoramaBase(Node):
         yield from pipeline.watch.complaints()
         for camera, fault in pipeline.rig.faults.items():
             yield f'{camera}: {fault}'
-        if self.settings.level == 'imu' and self._imu_s is None:
-            yield 'level is imu, but nothing came on the topic imu; level is symmetric so far'
-        elif self.settings.level == 'imu' and monotonic() - self._imu_s > _SILENT_IMU_S:
-            silent_s = monotonic() - self._imu_s
-            yield f'nothing came on the topic imu for {silent_s:.0f} s; the last level is held'
+        if self.settings.level == 'imu':
+            yield from pipeline.level.faults()

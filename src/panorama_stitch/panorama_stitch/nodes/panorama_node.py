@@ -6,6 +6,7 @@ from fisheye_capture.capture_settings import CameraSettings
 from panorama_stitch.nodes.base_node import PanoramaBase
 from panorama_stitch.nodes.camera_input import camera_inputs
 from panorama_stitch.pipeline.panorama_settings import MountSettings, PanoramaSettings
+from panorama_stitch.pipeline.view_settings import ViewSettings
 
 
 class PanoramaNode(PanoramaBase):
@@ -15,6 +16,7 @@ class PanoramaNode(PanoramaBase):
         ('', PanoramaSettings),
         ('CAMERA.', CameraSettings),
         ('CAMERA.', MountSettings),
+        ('VIEW.', ViewSettings),
     )
 
     def __init__(self, **kwargs):

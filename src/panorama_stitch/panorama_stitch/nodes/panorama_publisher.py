@@ -30,11 +30,11 @@ class PanoramaPublisher:
         self._published, self._rate = 0, RateMeter()
         self._latencies_ms: deque[float] = deque(maxlen=_LATENCIES)
 
-    def publish(self, panorama: Panorama, settings: PanoramaOutputSettings) -> None:
-        """Draw a panorama and publish it, if anybody subscribes."""
+    def publish(self, panorama: Panorama, settings: PanoramaOutputSettings) -> bool:
+        """Draw a panorama and publish it if anybody subscribes; return whether it was drawn."""
         is_video_wanted = self._video.wanted
         if not (self._image.wanted or is_video_wanted):
-            return
+            return False
         surface = panorama.surface
         size = surface.width, surface.height, panorama.encoding
         if self._buffer is None or not self._buffer.fits(*size):
@@ -49,6 +49,7 @@ class PanoramaPublisher:
         self._rate.count()
         age_ns = self._clock.now().nanoseconds - panorama.stamp_ns
         self._latencies_ms.append(age_ns / 1e6)
+        return True
 
     def stop(self) -> None:
         """End the thread of the encoder."""

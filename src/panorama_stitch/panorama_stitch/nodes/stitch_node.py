@@ -15,12 +15,13 @@ from fisheye_geometry.settling import Settling
 from fisheye_geometry.surface import Surface
 from panorama_stitch.nodes.base_node import PanoramaBase
 from panorama_stitch.pipeline.panorama_settings import MountSettings, PanoramaOutputSettings
+from panorama_stitch.pipeline.view_settings import ViewSettings
 
 
 class StitchNode(PanoramaBase):
     """CAMERA/image_rect and CAMERA/projection of each camera to panorama/image."""
 
-    SETTINGS = (('', PanoramaOutputSettings), ('CAMERA.', MountSettings))
+    SETTINGS = (('', PanoramaOutputSettings), ('CAMERA.', MountSettings), ('VIEW.', ViewSettings))
 
     def __init__(self, **kwargs):
         super().__init__('stitch', PanoramaOutputSettings, **kwargs)

@@ -63,9 +63,6 @@ class MountedCameras(KnownCameras):
         self, overlaps: Sequence[Overlap], settings: PanoramaOutputSettings
     ) -> RigSolution:
         """Return the rig that overlaps, mounts and level make; see `solve_rig`."""
-        extra = Attitude(
-            *(radians(getattr(settings, f'level_{name}_deg')) for name in ('yaw', 'pitch', 'roll'))
-        )
         how, gravity = settings.level, None
         if how == 'imu' and self.gravity is None:
             how = 'symmetric'
@@ -73,7 +70,15 @@ class MountedCameras(KnownCameras):
             # What the imu feels is in the robot's frame, in which the mounts are symmetric.
             robot = self.solve(overlaps, settings, level='symmetric').rig
             gravity = robot.cameras[0].attitude.matrix.T @ self.gravity
+        extra = self.extra(settings)
         return self.solve(overlaps, settings, level=how, gravity=gravity, extra=extra)
+
+    @staticmethod
+    def extra(settings: PanoramaOutputSettings) -> Attitude:
+        """Return what the settings turn on top of what is level."""
+        return Attitude(
+            *(radians(getattr(settings, f'level_{name}_deg')) for name in ('yaw', 'pitch', 'roll'))
+        )
 
     def solve(
         self, overlaps: Sequence[Overlap], settings: PanoramaOutputSettings, **level: Any

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.surface import Surface
 from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.pipeline.stale import write_age
@@ -26,8 +27,12 @@ class Panorama:
         Of the images and of the panorama.
     stale
         For each camera that is not live the columns [begin, end) that show it, and its age, s.
+    stale_cameras
+        Indices of these cameras.
     is_economical
         Whether there is no time for all that blends can do.
+    orientation
+        Takes rays of the panorama to level rays at that time; None where that does not change.
     """
 
     compositor: Compositor
@@ -35,7 +40,9 @@ class Panorama:
     stamp_ns: int
     encoding: str
     stale: dict[str, tuple[tuple[int, int], float]]
+    stale_cameras: frozenset[int] = frozenset()
     is_economical: bool = False
+    orientation: Attitude | None = None
 
     @property
     def surface(self) -> Surface:
@@ -55,3 +62,8 @@ class Panorama:
         )
         for camera, (columns, age_s) in self.stale.items():
             write_age(out, columns, camera, age_s)
+
+    def expose(self) -> None:
+        """Follow the brightness of the images, where the panorama itself is not drawn."""
+        if not self.stale:
+            self.compositor.expose(self.images)

@@ -13,12 +13,11 @@ from fisheye_undistort.undistort_settings import SurfaceSettings
 from panorama_stitch.compose.blends import BLENDS
 from panorama_stitch.compose.layout import CROPS
 from panorama_stitch.overlap.overlap_settings import OverlapSettings
-
-"""Of a camera: it is a namespace."""
+from panorama_stitch.pipeline.view_settings import ViewNames
 
 
 @dataclass(frozen=True)
-class PanoramaOutputSettings(OverlapSettings, VideoSettings):
+class PanoramaOutputSettings(ViewNames, OverlapSettings, VideoSettings):
     """What both nodes that make panoramas can be told; all that the stitch node can."""
 
     cameras: tuple[str, ...] = setting(
@@ -144,6 +143,7 @@ class PanoramaOutputSettings(OverlapSettings, VideoSettings):
                 raise SettingError(
                     f"cameras has '{name}'; expected a letter, then letters, digits or _"
                 )
+        self.check_views(cameras)
         for name in ('offset_x_px', 'offset_y_px'):
             values = getattr(self, name)
             if len(values) != pairs and not all(map(isnan, values)):

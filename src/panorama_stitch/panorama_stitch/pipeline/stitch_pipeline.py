@@ -12,6 +12,7 @@ import numpy as np
 
 from fisheye_core.encodings import alike
 from fisheye_core.errors import FisheyeError
+from fisheye_geometry.inertial import ImuReading
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.surface import Surface
 from panorama_stitch.compose.compositor import Compositor
@@ -19,7 +20,7 @@ from panorama_stitch.overlap.overlap_result import Overlap
 from panorama_stitch.pipeline.compositor_builder import CompositorBuilder
 from panorama_stitch.pipeline.economy import Economy
 from panorama_stitch.pipeline.frame_sets import FrameSet, FrameSets
-from panorama_stitch.pipeline.gravity import Gravity
+from panorama_stitch.pipeline.live_level import LiveLevel
 from panorama_stitch.pipeline.panorama import Panorama
 from panorama_stitch.pipeline.panorama_settings import MountSettings, PanoramaOutputSettings
 from panorama_stitch.pipeline.rig_state import RigState
@@ -49,6 +50,8 @@ class StitchPipeline:
         Frame sets that could not be composed.
     economy : Economy
         Whether there is time for all that blends can do.
+    level : LiveLevel
+        What an IMU says.
     """
 
     def __init__(self, settings: PanoramaOutputSettings, mounts: Sequence[MountSettings] = ()):
@@ -72,7 +75,7 @@ class StitchPipeline:
         self.economy = Economy()
         self.watch = SeamWatch(self.rig)
         self._builder = CompositorBuilder(self.rig, self.watch)
-        self._gravity = Gravity()
+        self.level = LiveLevel(self.rig)
         self._asked: Future | None = None
         self._asked_what: tuple | None = None
         self._dimensions = 0
@@ -117,12 +120,10 @@ class StitchPipeline:
         self.frames.apply(settings)
         self._builder.renew(forget=False)
 
-    def set_gravity(self, gravity: np.ndarray) -> None:
-        """Level the panorama by where things fall, (3,) in the robot's frame; see `RigState`."""
-        if self._gravity.feel(gravity):
-            self.rig.gravity = self._gravity.direction
-            if self.settings.level == 'imu':
-                self._builder.renew(forget=False)
+    def feel(self, reading: ImuReading) -> None:
+        """Level by what an IMU says, where `level` is imu."""
+        if self.level.feel(reading) and self.settings.level == 'imu':
+            self._builder.renew(forget=False)
 
     def inherit(self, former: 'StitchPipeline') -> None:
         """Use the overlaps of another pipeline where the cameras show what they showed there."""
@@ -209,6 +210,13 @@ class StitchPipeline:
             camera: (compositor.layout.shown_columns(cameras.index(camera)), age_s)
             for camera, age_s in frames.ages_s.items()
         }
-        encoding = self.frames.encoding(images[0])
-        is_economical = self.economy.started()
-        return Panorama(compositor, images, frames.stamp_ns, encoding, stale, is_economical)
+        return Panorama(
+            compositor,
+            images,
+            frames.stamp_ns,
+            self.frames.encoding(images[0]),
+            stale,
+            frozenset(map(cameras.index, frames.ages_s)),
+            self.economy.started(),
+            self.level.orientation(compositor, frames.stamp_ns, self.overlaps, self.settings),
+        )
