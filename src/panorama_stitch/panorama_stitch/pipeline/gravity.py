@@ -75,7 +75,10 @@ class GravityHistory:
                 self._newest_ns, self._doubted_ns = reading.stamp_ns, None
                 self._age_s = self._usual = 0.0
                 return self._keep(reading, reading.down, last=None)
-            expected = _turned(last.down, reading.turn_rad_s, since_s)
+            expected = last.down
+            if reading.turn_rad_s is not None:
+                mean_rad_s = (last.turn_rad_s + reading.turn_rad_s) / 2
+                expected = _turned(last.down, mean_rad_s, since_s)
             if self._is_doubted(reading, expected):
                 return None
             if reading.is_fused:
@@ -137,9 +140,9 @@ class GravityHistory:
         return down / max(float(np.linalg.norm(down)), 1e-9)
 
 
-def _turned(down: np.ndarray, turn_rad_s: np.ndarray | None, seconds: float) -> np.ndarray:
+def _turned(down: np.ndarray, turn_rad_s: np.ndarray, seconds: float) -> np.ndarray:
     """Return where a direction of the world lies after a turn of the robot."""
-    return down if turn_rad_s is None else rotation_matrix(-seconds * turn_rad_s) @ down
+    return rotation_matrix(-seconds * turn_rad_s) @ down
 
 
 def _between(moment: _Moment, later: _Moment | None, stamp_ns: int) -> np.ndarray:
