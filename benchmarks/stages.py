@@ -13,7 +13,7 @@ from timing import Spread, spread
 from turning import turning
 
 from fisheye_core.coded_picture import decoded
-from fisheye_core.h264_encoder import to_planes
+from fisheye_core.planar_picture import to_planes
 from fisheye_core.video import video_decoder, video_encoder
 from fisheye_core.video_settings import VideoSettings
 

@@ -6,10 +6,10 @@ import av
 import numpy as np
 
 from fisheye_core.encodings import from_opencv
-from fisheye_core.h264_encoder import MAX_MACROBLOCKS
 from fisheye_core.nal_units import is_keyframe
 from fisheye_core.picture_decoder import PictureDecoder
 from fisheye_core.picture_numbers import PictureNumbers
+from fisheye_core.planar_picture import MAX_MACROBLOCKS
 
 _MAX_PIXELS = MAX_MACROBLOCKS * 256
 """A few bytes can claim to be more than fits into memory."""

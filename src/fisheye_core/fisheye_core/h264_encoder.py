@@ -7,7 +7,6 @@ from fractions import Fraction
 from typing import NamedTuple
 
 import av
-import cv2
 import numpy as np
 from av.codec.codec import UnknownCodecError
 from av.error import FFmpegError
@@ -15,15 +14,12 @@ from av.video.codeccontext import VideoCodecContext
 from av.video.frame import PictureType
 
 from fisheye_core import ffmpeg_log
-from fisheye_core.encodings import to_opencv
-from fisheye_core.errors import ImageFormatError, VideoError
+from fisheye_core.errors import VideoError
 from fisheye_core.nal_units import is_keyframe, parameter_sets
 from fisheye_core.picture_rate import PictureRate
+from fisheye_core.planar_picture import to_planes
 from fisheye_core.video_settings import ENCODERS
 
-MAX_MACROBLOCKS = 36_864
-MAX_SIDE_PX = 8688
-"""Of level 5.1, which every decoder takes (ITU-T H.264, table A-1): 9.4 million px."""
 _USUAL_HZ = 30.0
 _PIXELS_OF_A_THREAD = 1_000_000
 _RATE, _BUFFER_S = 0.85, 0.2
@@ -64,7 +60,7 @@ class H264Encoder:
         Why it is not the one that was asked for; '' for nothing.
     """
 
-    def __init__(self, *, bitrate_kbps: int, keyframe_s: float, encoder: str = 'auto'):
+    def __init__(self, *, bitrate_kbps: int, keyframe_s: float, encoder: str):
         """Set up; `encoder` is one of `ENCODERS`."""
         self.bitrate_kbps, self.keyframe_s = bitrate_kbps, keyframe_s
         self.name = self.note = ''
@@ -185,35 +181,3 @@ class H264Encoder:
             self._is_keyframe_wanted = False
             frame.pict_type = PictureType.I
         return frame
-
-
-def to_planes(image: np.ndarray, encoding: str) -> np.ndarray:
-    """Convert a picture to planar 4:2:0 (height * 3 / 2, width) uint8, BT.601, of even sides.
-
-    Parameters
-    ----------
-    image, encoding
-        As `H264Encoder.encode` takes them.
-
-    Raises
-    ------
-    ImageFormatError
-        If it is empty.
-    """
-    if not image.size:
-        raise ImageFormatError(f'a picture of {image.shape[1]}x{image.shape[0]} px is empty')
-    image = to_opencv(image, encoding)
-    while -(-image.shape[0] // 16) * -(-image.shape[1] // 16) > MAX_MACROBLOCKS or (
-        max(image.shape[:2]) > MAX_SIDE_PX
-    ):
-        half = tuple(max(1, side // 2) for side in image.shape[1::-1])
-        image = cv2.resize(image, half, interpolation=cv2.INTER_AREA)
-    height, width = image.shape[:2]
-    if height % 2 or width % 2:
-        image = cv2.copyMakeBorder(image, 0, height % 2, 0, width % 2, cv2.BORDER_REPLICATE)
-    if image.ndim == 3:
-        return cv2.cvtColor(image, cv2.COLOR_BGR2YUV_I420)
-    # As COLOR_BGR2YUV_I420 does it: 16 to 235.
-    luminance = cv2.convertScaleAbs(image, alpha=219 / 255, beta=16)
-    colour = np.full((image.shape[0] // 2, image.shape[1]), 128, np.uint8)
-    return np.vstack([luminance, colour])
