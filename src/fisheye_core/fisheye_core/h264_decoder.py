@@ -1,6 +1,7 @@
 """H.264 to pictures without delay, and without showing what arrived damaged."""
 
 import time
+from math import inf, isfinite
 
 import av
 import numpy as np
@@ -13,8 +14,9 @@ from fisheye_core.planar_picture import MAX_MACROBLOCKS
 
 _MAX_PIXELS = MAX_MACROBLOCKS * 256
 """A few bytes can claim to be more than fits into memory."""
-_PAUSE_S = 0.5
-"""After it, so many pictures may be missing that their numbers are what they were."""
+_MANY_PERIODS = 10
+"""After a longer pause so many pictures may be missing that their numbers are what they were."""
+_USUAL_PERIOD_S, _LONGEST_PERIOD_S, _NEWEST = 1 / 30, 1.0, 0.1
 
 
 class H264Decoder:
@@ -29,7 +31,7 @@ class H264Decoder:
     def __init__(self) -> None:
         self.damaged = 0
         self._pictures, self._numbers = _fresh(), PictureNumbers()
-        self._came_s = 0.0
+        self._came_s, self._period_s = -inf, _USUAL_PERIOD_S
 
     @property
     def wants_keyframe(self) -> bool:
@@ -56,8 +58,7 @@ class H264Decoder:
             (height, width[, 3]) uint8, the newest picture; None if there is none that is whole.
         """
         now_s = time.monotonic() if now_s is None else now_s
-        is_late, self._came_s = now_s - self._came_s > _PAUSE_S, now_s
-        if self._numbers.has_gap(data) or is_late:
+        if self._numbers.has_gap(data) or self._is_after_pause(now_s):
             self._pictures.expect_keyframe()
         has_begun = self._pictures.has_begun
         if self._pictures.waits:
@@ -76,6 +77,13 @@ class H264Decoder:
             return None
         grey = encoding == 'mono8'
         return from_opencv(frames[-1].to_ndarray(format='gray' if grey else 'bgr24'), encoding)
+
+    def _is_after_pause(self, now_s: float) -> bool:
+        passed_s, self._came_s = now_s - self._came_s, now_s
+        is_after_pause = passed_s > _MANY_PERIODS * self._period_s
+        if isfinite(passed_s):
+            self._period_s += _NEWEST * (min(passed_s, _LONGEST_PERIOD_S) - self._period_s)
+        return is_after_pause
 
 
 def _fresh() -> PictureDecoder:

@@ -94,6 +94,11 @@ def test_after_a_pause_a_picture_waits_for_a_keyframe_though_its_number_fits(pac
     assert decoder.wants_keyframe
 
 
+def test_slow_cameras_have_no_pauses(packets):
+    numbers, _ = shown(packets, lambda n, data: data, hz=1.5)
+    assert len(numbers) > COUNT - GOP
+
+
 def test_grey_and_colour(packets):
     decoder = video_decoder()
     colour = decoder.decode(packets[0], 'bgr8', 0.0)
