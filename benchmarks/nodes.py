@@ -4,10 +4,11 @@ import json
 import os
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from math import radians
 from pathlib import Path
+from subprocess import Popen
 
 import cv2
 import numpy as np
@@ -188,10 +189,10 @@ def run_rig(setup: Setup, seconds: float, log_folder: Path) -> Run:
         time.sleep(SETTLE_S)
         watcher.restart()
         counts.restart()
-        before_s, begin = cpu_s(rig), time.monotonic()
+        before_s, begin = cpu_s(rig.processes.values()), time.monotonic()
         time.sleep(seconds)
         stamps_ns, latencies_ms = watcher.stamps_ns[:], watcher.latencies_ms[:]
-        used_s, passed_s = cpu_s(rig) - before_s, time.monotonic() - begin
+        used_s, passed_s = cpu_s(rig.processes.values()) - before_s, time.monotonic() - begin
         rig.check_alive()
         due = round((stamps_ns[-1] - stamps_ns[0]) * 1e-9 * setup.frame_rate_hz) + 1
         is_free = setup.frame_rate_hz == FULL_SPEED_HZ
@@ -230,9 +231,9 @@ def save_rig(folder: Path, rig: KnownRig, size: tuple[int, int]) -> KnownRig:
     return folder_rig(folder)
 
 
-def cpu_s(rig: RigProcesses) -> float:
-    """Processor time that the nodes have used."""
-    return sum(_ticks(process.pid) for process in rig.processes.values()) / _TICKS_PER_S
+def cpu_s(processes: Iterable[Popen]) -> float:
+    """Processor time that processes have used."""
+    return sum(_ticks(process.pid) for process in processes) / _TICKS_PER_S
 
 
 def _ticks(pid: int) -> int:
