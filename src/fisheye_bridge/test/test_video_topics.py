@@ -29,6 +29,8 @@ SOON = 8
 """Pictures: what passes until a new subscriber and the publisher have found each other."""
 CLOSE = 6.0
 FUZZED = 1000
+CALLBACKS = 6
+"""For one picture: so many subscribers and requests, and more."""
 
 
 class VideoLink:
@@ -67,6 +69,8 @@ class VideoLink:
         self.sent += 1
         self.video.put(grey, 'bgr8', Header(stamp=stamp_of(self.sent)), settings)
         self._executor.spin_once(0.02)
+        for _ in range(CALLBACKS):
+            self._executor.spin_once(0)
         return True
 
     def until(self, condition, what):

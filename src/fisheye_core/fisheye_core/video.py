@@ -1,6 +1,5 @@
 """Video of pictures: the door to encoder and decoder, which need PyAV, and that is optional."""
 
-import importlib.util
 from typing import TYPE_CHECKING
 
 from fisheye_core.errors import VideoError
@@ -32,8 +31,10 @@ def video_decoder() -> 'H264Decoder':
 
 
 def _check_av() -> None:
-    if importlib.util.find_spec('av') is None:
+    try:
+        import av  # noqa: F401
+    except ImportError as error:
         raise VideoError(
-            'video needs PyAV, which is missing here: sudo apt install python3-av, or '
+            f'video needs PyAV, which is missing here ({error}): sudo apt install python3-av, or '
             'pip install av'
-        )
+        ) from error

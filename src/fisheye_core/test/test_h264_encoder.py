@@ -1,6 +1,6 @@
 """Encoding: one packet for each picture at once, as small as asked, whatever comes."""
 
-import importlib.util
+import sys
 from dataclasses import replace
 from itertools import accumulate, repeat
 
@@ -176,6 +176,6 @@ def test_an_encoder_that_cannot_work_here_is_told_and_replaced(name):
 
 @pytest.mark.parametrize('make', [lambda: video_encoder(VideoSettings()), video_decoder])
 def test_without_pyav_a_sentence_says_what_to_install(monkeypatch, make):
-    monkeypatch.setattr(importlib.util, 'find_spec', lambda name: None)
+    monkeypatch.setitem(sys.modules, 'av', None)
     with pytest.raises(VideoError, match=r'needs PyAV.*apt install python3-av'):
         make()
