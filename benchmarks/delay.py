@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 from network import FOV_DEG, OFFSET_PX, SIZE, Ages
-from slow_link import ROBOT, Quality, SlowLink
+from slow_link import ROBOT, LinkQuality, SlowLink
 
 from fisheye_capture.synthetic import synthetic_lens
 from fisheye_testing.rig import RigProcesses, unused_domain
@@ -27,7 +27,7 @@ from fisheye_testing.waiting import wait_for
 LINKS = {
     'loopback': None,
     **{
-        f'{mbit_s}/{percent}': Quality(mbit_s, 40.0, percent / 100)
+        f'{mbit_s}/{percent}': LinkQuality(mbit_s, 40.0, percent / 100)
         for mbit_s in (8, 2)
         for percent in (0, 1, 5)
     },
@@ -70,7 +70,7 @@ def main() -> None:
             print(f'| {LINKS[name] or name} | {kind} | {" | ".join(cells)} |', flush=True)
 
 
-def measure(quality: Quality | None, kind: str, seconds: float, has_cut: bool) -> list[str]:
+def measure(quality: LinkQuality | None, kind: str, seconds: float, has_cut: bool) -> list[str]:
     """Return the cells of a row."""
     domain = unused_domain()
     has_cut = has_cut and quality is not None

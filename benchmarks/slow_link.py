@@ -22,7 +22,7 @@ _QUEUE_S = 0.25
 """Of the link's rate that its queue holds, as that of a modem does."""
 
 
-class Quality(NamedTuple):
+class LinkQuality(NamedTuple):
     """What a link is like: its rate each way, its delay one way and how much it loses."""
 
     mbit_s: float
@@ -42,7 +42,7 @@ class SlowLink:
         The two machines, at the addresses `ROBOT` and `BASE`.
     """
 
-    def __init__(self, quality: Quality):
+    def __init__(self, quality: LinkQuality):
         prepare = 'mount -t tmpfs tmpfs /dev/shm && ip link set lo up'
         self.robot, self.base = (Namespace(('mount', 'net'), prepare) for _ in range(2))
         rate, taps = f'{quality.mbit_s}mbit', []

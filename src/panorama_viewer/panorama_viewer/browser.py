@@ -10,7 +10,7 @@ from aiohttp import WSCloseCode, web
 
 from fisheye_core.errors import VideoError
 from panorama_viewer.connection import Connection
-from panorama_viewer.feeds import JpegFeed, Picture, VideoFeed
+from panorama_viewer.feeds import JpegFeed, TimedJpeg, VideoFeed
 from panorama_viewer.way import Way
 
 DRAWN, HEARD = 'drawn', 'heard'
@@ -37,7 +37,7 @@ class Browser:
         stream: web.WebSocketResponse,
         connection: Connection,
         state: Callable[[], dict[str, Any]],
-        picture: Callable[[], Picture | None],
+        picture: Callable[[], TimedJpeg | None],
         video: Callable[[], VideoFeed] | None,
         *,
         is_known: bool,
@@ -67,8 +67,8 @@ class Browser:
             except VideoError as error:
                 self._no_video = str(error)
         self._told: dict[str, Any] | None = None
-        self._seen: Picture | None = None
-        self._under_way: deque[Picture] = deque()
+        self._seen: TimedJpeg | None = None
+        self._under_way: deque[TimedJpeg] = deque()
         self._way = Way()
         self._silence: asyncio.TimerHandle | None = None
         self._words = {
@@ -149,18 +149,21 @@ class Browser:
             self._way.told(_now_s())
             await self._stream.send_json({**state, **self._own_state()})
         picture = self._picture()
-        if picture and picture is not self._seen and self._feed.takes(picture, _now_s()):
+        if picture and picture is not self._seen and self._takes(picture):
             self._seen = picture
             await self._send(picture)
 
-    async def _send(self, picture: Picture) -> None:
+    def _takes(self, picture: TimedJpeg) -> bool:
+        return self._feed.takes(picture, _now_s(), self._connection.unconfirmed())
+
+    async def _send(self, picture: TimedJpeg) -> None:
         try:
             data = await self._feed.coded(picture)
         except VideoError as error:
             self._give_up(str(error))
             data = picture.jpeg
         if data:
-            self._feed.sent(_now_s())
+            self._feed.sent(_now_s(), len(data))
             self._under_way.append(picture)
             self._watch_silence()
             await self._stream.send_bytes(data)

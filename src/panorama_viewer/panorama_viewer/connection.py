@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import fcntl
+import sys
+from contextlib import suppress
+from termios import TIOCOUTQ
 from typing import Protocol
 
 from panorama_viewer.allowance import Allowance
@@ -56,6 +60,13 @@ class Connection(asyncio.Protocol):
     def abort(self) -> None:
         """End it at once, whatever is still to be sent."""
         self.transport.abort()
+
+    def unconfirmed(self) -> int:
+        """Return how many bytes the other machine has not confirmed; 0 where nobody can tell."""
+        reply = bytes(4)
+        with suppress(OSError):
+            reply = fcntl.ioctl(self.transport.get_extra_info('socket'), TIOCOUTQ, reply)
+        return self.transport.get_write_buffer_size() + int.from_bytes(reply, sys.byteorder)
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Begin."""

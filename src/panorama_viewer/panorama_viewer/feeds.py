@@ -11,7 +11,7 @@ from fisheye_core.coded_picture import decoded
 from fisheye_core.errors import ImageFormatError
 from fisheye_core.video import video_encoder
 from fisheye_core.video_settings import EncoderSettings, VideoSettings
-from panorama_viewer.pace import NOMINAL_HZ, Pace
+from panorama_viewer.pace import NOMINAL_HZ, PagePace
 
 DELTA, KEYFRAME = b'\0', b'\1'
 """What a message with H.264 begins with; one with a JPEG begins as every JPEG does, with FF."""
@@ -19,7 +19,7 @@ _KEYFRAME_S = 60.0
 """Nothing is lost on the way to a page; one that cannot go on asks for a keyframe."""
 
 
-class Picture:
+class TimedJpeg:
     """A panorama as JPEG, and when it came, s of the event loop's clock."""
 
     def __init__(self, jpeg: bytes, came_s: float):
@@ -39,19 +39,19 @@ class JpegFeed:
     def __init__(self):
         self._is_drawn = True
 
-    def takes(self, _: Picture, __: float) -> bool:
+    def takes(self, picture: TimedJpeg, now_s: float, unconfirmed: int) -> bool:
         """Return whether the newest picture can be sent now."""
         return self._is_drawn
 
-    async def coded(self, picture: Picture) -> bytes:
+    async def coded(self, picture: TimedJpeg) -> bytes:
         """Return what to send of a picture."""
         return picture.jpeg
 
-    def sent(self, _: float) -> None:
-        """Note that it was sent."""
+    def sent(self, now_s: float, size: int) -> None:
+        """Note that so many bytes were sent."""
         self._is_drawn = False
 
-    def drawn(self, _: float) -> None:
+    def drawn(self, now_s: float) -> None:
         """Note that the oldest picture on its way was drawn."""
         self._is_drawn = True
 
@@ -94,16 +94,17 @@ class VideoFeed:
                 video_keyframe_s=_KEYFRAME_S,
             )
         )
-        self._pace = Pace(settings().video_bitrate_kbps, now_s)
-        self._offered: Picture | None = None
+        self._pace = PagePace(settings().video_bitrate_kbps, now_s)
+        self._offered: TimedJpeg | None = None
         self._count = 0
 
-    def takes(self, picture: Picture, now_s: float) -> bool:
+    def takes(self, picture: TimedJpeg, now_s: float, unconfirmed: int) -> bool:
         """Return whether the newest picture can be sent now."""
         is_new, self._offered = picture is not self._offered, picture
-        return self._pace.takes(self._settings().video_bitrate_kbps, now_s, is_new=is_new)
+        most_kbps = self._settings().video_bitrate_kbps
+        return self._pace.takes(most_kbps, now_s, is_new=is_new, unconfirmed=unconfirmed)
 
-    async def coded(self, picture: Picture) -> bytes:
+    async def coded(self, picture: TimedJpeg) -> bytes:
         """Return what to send of a picture; nothing of one that is broken.
 
         Raises
@@ -115,9 +116,9 @@ class VideoFeed:
             self._worker, self._encode, picture
         )
 
-    def sent(self, now_s: float) -> None:
-        """Note that it was sent."""
-        self._pace.sent(now_s)
+    def sent(self, now_s: float, size: int) -> None:
+        """Note that so many bytes were sent."""
+        self._pace.sent(now_s, size)
 
     def drawn(self, now_s: float) -> None:
         """Note that the oldest picture on its way was drawn."""
@@ -127,7 +128,7 @@ class VideoFeed:
         """Begin with the next picture anew."""
         self._encoder.request_keyframe()
 
-    def _encode(self, picture: Picture) -> bytes:
+    def _encode(self, picture: TimedJpeg) -> bytes:
         self._encoder.bitrate_kbps = self._pace.nominal_kbps
         self._count += 1
         try:

@@ -112,7 +112,7 @@ class ViewerServer:
         self._loop.call_soon_threadsafe(self._site.show, jpeg)
 
     def apply(self, settings: ViewerSettings) -> None:
-        """Take the settings that can change while it runs."""
+        """Apply the settings that can change while it runs."""
         self._loop.call_soon_threadsafe(self._site.apply, settings)
 
     def tell(self, **state: Any) -> None:

@@ -12,7 +12,7 @@ from fisheye_core.errors import FisheyeError
 from panorama_viewer.address import is_loopback
 from panorama_viewer.audience import Audience
 from panorama_viewer.browser import RESTART, Browser, dismiss
-from panorama_viewer.feeds import Picture, VideoFeed
+from panorama_viewer.feeds import TimedJpeg, VideoFeed
 from panorama_viewer.gate import Gate
 from panorama_viewer.guard import HEADERS, SUBPROTOCOL, Guard, offers
 from panorama_viewer.pages import page, pages
@@ -60,7 +60,7 @@ class Site:
         self._guard = Guard(settings.host, self.token, settings.public)
         self._settings = settings
         self._worker = ThreadPoolExecutor(1, 'encode')
-        self._picture: Picture | None = None
+        self._picture: TimedJpeg | None = None
         self._state: dict[str, Any] = {
             'stale_after_s': settings.stale_after_s,
             'needs_token': bool(self.token),
@@ -83,11 +83,11 @@ class Site:
 
     def show(self, jpeg: bytes) -> None:
         """Show a picture in every browser that is ready for one."""
-        self._picture = Picture(jpeg, asyncio.get_running_loop().time())
+        self._picture = TimedJpeg(jpeg, asyncio.get_running_loop().time())
         self._wake()
 
     def apply(self, settings: ViewerSettings) -> None:
-        """Take what can change while it runs: the bit rate."""
+        """Apply what can change while it runs: the bit rate."""
         self._settings = settings
 
     def tell(self, state: dict[str, Any]) -> None:
@@ -109,7 +109,7 @@ class Site:
         for browser in self.browsers:
             browser.wake()
 
-    def _fresh(self) -> Picture | None:
+    def _fresh(self) -> TimedJpeg | None:
         """Return the newest picture if it is not stale."""
         now_s = asyncio.get_running_loop().time()
         if self._picture and now_s - self._picture.came_s < self._settings.stale_after_s:
