@@ -44,6 +44,14 @@ export class Projection {
     return SURFACES[this.surface];
   }
 
+  /** What of an image's width and height is the panorama's: video has even sides. */
+  share({ displayWidth, displayHeight }) {
+    return [
+      displayWidth - this.width === 1 ? this.width / displayWidth : 1,
+      displayHeight - this.height === 1 ? this.height / displayHeight : 1,
+    ];
+  }
+
   /** Ray of a pixel; integers are pixel centres. */
   ray(x, y) {
     return this.kind.ray((x - this.center_x_px) / this.focal_px,

@@ -22,7 +22,7 @@ const FRAGMENT = `
   uniform mat3 turn;
   uniform int kind;
   uniform bool wraps;
-  uniform vec2 center, size;
+  uniform vec2 center, size, share;
   uniform float focal;
   vec2 place(vec3 ray) {
     ${CASES.join('\n    ')}
@@ -32,12 +32,12 @@ const FRAGMENT = `
     vec2 where = (center + focal * place(turn * vec3(point, 1.0)) + 0.5) / size;
     if (wraps) where.x = fract(where.x);
     bool inside = all(greaterThanEqual(where, vec2(0.0))) && all(lessThanEqual(where, vec2(1.0)));
-    gl_FragColor = inside ? texture2D(panorama, where) : vec4(0.063, 0.082, 0.106, 1.0);
+    gl_FragColor = inside ? texture2D(panorama, where * share) : vec4(0.063, 0.082, 0.106, 1.0);
     // Half a pixel from an edge the one beyond it has its part: as repeated textures have it,
     // which WebGL 1 has for powers of two only.
     float beside = min(where.x, 1.0 - where.x) * size.x;
     if (wraps && inside && beside < 0.5) {
-      vec4 beyond = texture2D(panorama, vec2(1.0 - where.x, where.y));
+      vec4 beyond = texture2D(panorama, vec2(1.0 - where.x, where.y) * share);
       gl_FragColor = mix(gl_FragColor, beyond, 0.5 - beside);
     }
   }`;
@@ -97,6 +97,7 @@ export class Look {
     gl.uniform1i(this.at('wraps'), projection.wraps);
     gl.uniform2f(this.at('center'), projection.center_x_px, projection.center_y_px);
     gl.uniform2f(this.at('size'), projection.width, projection.height);
+    gl.uniform2f(this.at('share'), ...projection.share(bitmap));
     gl.uniform1f(this.at('focal'), projection.focal_px);
     gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
   }

@@ -37,23 +37,15 @@ export class Pictures {
     for (const done of this.waiting.splice(0)) done(null);
   }
 
-  /**
-   * The picture that bytes hold, to be drawn and closed; null if there is none.
-   * A JPEG or a picture larger than the projection, or `widest`, is brought to that size.
-   */
+  /** The picture that bytes hold, at most `widest` px wide, to be closed; null if there is none. */
   async image(data, projection, widest) {
     const [first] = new Uint8Array(data, 0, 1);
     const isJpeg = first === JPEG;
     const source = isJpeg ? new Blob([data])
       : await this.decoded(new Uint8Array(data, 1), first === KEYFRAME);
-    if (!source) return null;
     const narrowed = projection?.width > widest ? { resizeWidth: widest } : {};
-    // Video has even sides: the last column or row may be there twice.
-    const { width, height } = projection ?? {};
-    const isOdd = source.displayWidth - width === 1 || source.displayHeight - height === 1;
-    if (!isJpeg && !isOdd && !narrowed.resizeWidth) return source;
-    const part = isOdd ? [0, 0, width, height] : [];
-    const bitmap = await createImageBitmap(source, ...part, narrowed).catch(() => null);
+    if (!source || (!isJpeg && !narrowed.resizeWidth)) return source;
+    const bitmap = await createImageBitmap(source, narrowed).catch(() => null);
     if (!isJpeg) source.close();
     return bitmap;
   }

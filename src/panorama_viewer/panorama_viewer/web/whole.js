@@ -11,7 +11,10 @@ export class Whole {
   draw(bitmap, projection, view = null, ratio = 1) {
     const { pen, canvas } = this;
     pen.imageSmoothingQuality = 'high';
-    pen.drawImage(bitmap, 0, 0, canvas.width, canvas.height);
+    const [across, down] = projection.share(bitmap);
+    const { displayWidth = bitmap.width, displayHeight = bitmap.height } = bitmap;
+    const part = [0, 0, across * displayWidth, down * displayHeight];
+    pen.drawImage(bitmap, ...part, 0, 0, canvas.width, canvas.height);
     if (view) this.outline(projection, view, ratio);
   }
 
