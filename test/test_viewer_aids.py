@@ -10,7 +10,7 @@ from test_viewer_browser import CLOSED, MAGENTA, SEAM, SURFACES, Page, painted, 
 
 from fisheye_geometry.surface import Surface
 
-browser, serve = viewer.browser, viewer.serve  # its fixtures
+serve = viewer.serve  # its fixture
 
 HEADING, GROUND, CAMERA = (132, 220, 61), (77, 216, 255), (255, 200, 94)
 """Blue, green and red of the marks."""

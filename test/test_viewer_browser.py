@@ -1,9 +1,7 @@
 """The viewer's page in a real browser: headless Chromium, as packaged by Debian."""
 
 import math
-import os
 import re
-import shutil
 import subprocess
 import sys
 import threading
@@ -14,7 +12,6 @@ import cv2
 import numpy as np
 import pytest
 from known_rigs import synthetic_rig
-from selenium import webdriver
 from selenium.webdriver import ActionChains, Keys
 
 from fisheye_bridge.projection import surface_of
@@ -54,30 +51,6 @@ SEAM = (216, 79, 255)
 """As the page marks it when one sets the rig up."""
 OVERLAP_DEG = 50.0
 """Of two cameras of 170 degrees, 120 apart."""
-
-
-@pytest.fixture(scope='module')
-def browser(tmp_path_factory):
-    if missing := [name for name in ('chromium', 'chromedriver') if not shutil.which(name)]:
-        message = f'{" and ".join(missing)} missing: sudo apt install chromium chromium-driver'
-        if os.environ.get('REQUIRE_BROWSER') == '1':
-            pytest.fail(message)
-        pytest.skip(message)
-    options = webdriver.ChromeOptions()
-    options.binary_location = shutil.which('chromium')
-    for switch in ('headless=new', 'hide-scrollbars', 'use-angle=swiftshader'):
-        options.add_argument(f'--{switch}')
-    # A machine without a graphics card still draws WebGL; root cannot have Chromium's sandbox.
-    options.add_argument('--enable-unsafe-swiftshader')
-    if os.geteuid() == 0:
-        options.add_argument('--no-sandbox')
-    options.accept_insecure_certs = True
-    downloads = tmp_path_factory.mktemp('downloads')
-    options.add_experimental_option('prefs', {'download.default_directory': str(downloads)})
-    driver = webdriver.Chrome(options, webdriver.ChromeService(shutil.which('chromedriver')))
-    driver.downloads = downloads
-    yield driver
-    driver.quit()
 
 
 class Page:

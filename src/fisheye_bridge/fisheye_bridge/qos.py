@@ -19,10 +19,19 @@ VIDEO_INPUT = QoSProfile(depth=30, reliability=ReliabilityPolicy.RELIABLE)
 BEST_EFFORT_INPUT = QoSProfile(depth=3, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Where the publisher is not ours: this meets a reliable one and a best-effort one."""
 
+SENSOR_INPUT = QoSProfile(depth=20, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""What comes by the hundred a second: a moment without the processor loses none, and after a
+longer one the newest are what counts."""
+
 LATCHED = QoSProfile(
     depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
 """State: who comes later still gets the last one."""
+
+LATCHED_INPUT = QoSProfile(
+    depth=30, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+)
+"""State that may come with each picture: none is lost before its picture is handled."""
 
 HEARTBEAT = QoSProfile(depth=10, deadline=Duration(seconds=3))
 """What comes once a second, and promises to."""

@@ -81,6 +81,14 @@ def quaternion(attitude: Attitude) -> tuple[float, float, float, float]:
     return x, y, z, cos(angle_rad / 2)
 
 
+def attitude_of(x: float, y: float, z: float, w: float) -> Attitude:
+    """Return the attitude of a unit quaternion; the inverse of `quaternion`."""
+    vector = np.array([x, y, z])
+    sine = float(np.linalg.norm(vector))
+    scale = 2 * atan2(sine, w) / sine if sine else 2.0
+    return Attitude.of(rotation_matrix(scale * vector))
+
+
 def angle_between(first: np.ndarray, second: np.ndarray) -> float:
     """Return the angle of the rotation that takes one attitude (3, 3) to another, rad."""
     return float(np.linalg.norm(rotation_vector(np.asarray(first).T @ np.asarray(second))))

@@ -21,7 +21,7 @@ from panorama_stitch.compose.virtual_camera import VirtualCamera
 from panorama_stitch.compose.virtual_view import VirtualView
 from panorama_stitch.pipeline.panorama_settings import PanoramaSettings
 
-LENS = synthetic_lens(960, 720, np.radians(170))
+LENS = synthetic_lens(640, 480, np.radians(170))
 STAMP_NS = 700_000_000
 FAITHFUL_DB = 30.0
 """As of the panorama: two bilinear resamplings of an antialiased scene stay well above it."""
@@ -39,7 +39,7 @@ PAIR = deg(-70, 0, 0), deg(70, 0, 0)
 TILTED = deg(-70, -12, 3), deg(70, -12, -4)
 RING = tuple(deg(yaw, -5, 0) for yaw in (-135, -45, 45, 135))
 BACK_TO_BACK = deg(-90, 0, 0), deg(90, 0, 0)
-WIDE = synthetic_lens(960, 720, np.radians(210))
+WIDE = synthetic_lens(640, 480, np.radians(210))
 
 
 def rig_of(attitudes, *, is_closed=False, lens=LENS, **style):
@@ -80,10 +80,10 @@ def pair():
 
 
 @pytest.mark.parametrize('moves', [False, True])
-@pytest.mark.parametrize('yaw_deg', [-105, -60, 0, 8, 40, 105])
-@pytest.mark.parametrize('pitch_deg', [0, -25, 20])
+@pytest.mark.parametrize('yaw_deg', [-105, 0, 8, 60])
+@pytest.mark.parametrize('pitch_deg', [0, -25])
 def test_it_shows_the_scene(pair, yaw_deg, pitch_deg, moves):
-    camera = camera_at(yaw_deg, pitch_deg, 70)
+    camera = camera_at(yaw_deg, pitch_deg, 85, (400, 300))
     view, out = drawn(*pair, camera, moves=moves)
     assert view.seen_share > 1 - BLACK_SHARE
     lit = out.any(axis=2)
@@ -110,7 +110,7 @@ def test_a_seam_has_the_blend_of_the_panorama(blend):
 def test_all_around_there_is_no_end(attitudes, moves):
     lens = LENS if len(attitudes) > 2 else WIDE
     compositor, images = rig_of(attitudes, is_closed=True, lens=lens)
-    for yaw_deg in range(-180, 180, 30):
+    for yaw_deg in range(-180, 180, 45):
         camera = camera_at(yaw_deg, 0, 80, (320, 160))
         view, out = drawn(compositor, images, camera, moves=moves)
         assert view.seen_share == 1

@@ -11,6 +11,7 @@ from aiohttp import WSCloseCode, web
 from fisheye_core.errors import VideoError
 from panorama_viewer.connection import Connection
 from panorama_viewer.feeds import JpegFeed, TimedJpeg, VideoFeed
+from panorama_viewer.projection import Quaternion
 from panorama_viewer.way import Way
 
 DRAWN, HEARD = 'drawn', 'heard'
@@ -68,6 +69,7 @@ class Browser:
                 self._no_video = str(error)
         self._told: dict[str, Any] | None = None
         self._seen: TimedJpeg | None = None
+        self._turned: Quaternion | None = None
         self._under_way: deque[TimedJpeg] = deque()
         self._way = Way()
         self._silence: asyncio.TimerHandle | None = None
@@ -166,6 +168,9 @@ class Browser:
             self._feed.sent(_now_s(), len(data))
             self._under_way.append(picture)
             self._watch_silence()
+            if picture.orientation != self._turned:
+                self._turned = picture.orientation
+                await self._stream.send_json({'orientation': self._turned})
             await self._stream.send_bytes(data)
 
     def _own_state(self) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from fisheye_core.errors import ImageFormatError
 from fisheye_core.video import video_encoder
 from fisheye_core.video_settings import EncoderSettings, VideoSettings
 from panorama_viewer.pace import NOMINAL_HZ, PagePace
+from panorama_viewer.projection import Quaternion
 
 DELTA, KEYFRAME = b'\0', b'\1'
 """What a message with H.264 begins with; one with a JPEG begins as every JPEG does, with FF."""
@@ -20,10 +21,10 @@ _KEYFRAME_S = 60.0
 
 
 class TimedJpeg:
-    """A panorama as JPEG, and when it came, s of the event loop's clock."""
+    """A panorama as JPEG, when it came, s of the event loop's clock, and what levels it."""
 
-    def __init__(self, jpeg: bytes, came_s: float):
-        self.jpeg, self.came_s = jpeg, came_s
+    def __init__(self, jpeg: bytes, came_s: float, orientation: Quaternion | None = None):
+        self.jpeg, self.came_s, self.orientation = jpeg, came_s, orientation
 
     @cached_property
     def pixels(self) -> np.ndarray:

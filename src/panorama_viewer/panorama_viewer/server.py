@@ -17,6 +17,7 @@ from panorama_viewer.address import reachable, refusal
 from panorama_viewer.certificate import Tls
 from panorama_viewer.faults import Faults
 from panorama_viewer.gate import Gate
+from panorama_viewer.projection import Quaternion
 from panorama_viewer.settings import ViewerSettings
 from panorama_viewer.site import Site
 
@@ -107,9 +108,9 @@ class ViewerServer:
         self._thread.join()
         self._loop.close()
 
-    def show(self, jpeg: bytes) -> None:
-        """Show a picture in every browser that is ready for one."""
-        self._loop.call_soon_threadsafe(self._site.show, jpeg)
+    def show(self, jpeg: bytes, orientation: Quaternion | None = None) -> None:
+        """Show a picture in every browser that is ready for one; turned so it is level."""
+        self._loop.call_soon_threadsafe(self._site.show, jpeg, orientation)
 
     def apply(self, settings: ViewerSettings) -> None:
         """Apply the settings that can change while it runs."""

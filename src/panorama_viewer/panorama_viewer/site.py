@@ -16,6 +16,7 @@ from panorama_viewer.feeds import TimedJpeg, VideoFeed
 from panorama_viewer.gate import Gate
 from panorama_viewer.guard import HEADERS, SUBPROTOCOL, Guard, offers
 from panorama_viewer.pages import page, pages
+from panorama_viewer.projection import Quaternion
 from panorama_viewer.settings import ViewerSettings
 from panorama_viewer.token import kept_token, new_token
 
@@ -81,9 +82,9 @@ class Site:
             app.router.add_get('/certificate.crt', answer)
         return app
 
-    def show(self, jpeg: bytes) -> None:
-        """Show a picture in every browser that is ready for one."""
-        self._picture = TimedJpeg(jpeg, asyncio.get_running_loop().time())
+    def show(self, jpeg: bytes, orientation: Quaternion | None = None) -> None:
+        """Show a picture in every browser that is ready for one; turned so it is level."""
+        self._picture = TimedJpeg(jpeg, asyncio.get_running_loop().time(), orientation)
         self._wake()
 
     def apply(self, settings: ViewerSettings) -> None:

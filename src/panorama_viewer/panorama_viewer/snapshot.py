@@ -14,15 +14,17 @@ import cv2
 import numpy as np
 
 from fisheye_core.errors import FileAccessError
+from fisheye_geometry.attitude import LEVEL, Attitude, attitude_of
 from fisheye_geometry.remap import RemapTable
 from fisheye_geometry.surface import Surface
-from panorama_viewer.projection import described
+from panorama_viewer.projection import Quaternion, described
 
 FORMATS = {'png': '.png', 'gpano': '.jpg'}
 """How a panorama can be saved, and the suffix of the file."""
 
 _SUFFIXES = ('.png', '.jpg', '.jpeg')
 _JPEG_QUALITY = 95
+_BORDER_POINTS = 400
 _REACH_PX = 3
 """What cubic interpolation needs beyond a pixel, and one for rounding."""
 _XMP_NAMESPACE = b'http://ns.adobe.com/xap/1.0/\0'
@@ -43,6 +45,7 @@ def save(
     surface: Surface,
     stamp_ns: int,
     wraps: bool = False,
+    orientation: Quaternion | None = None,
 ) -> list[Path]:
     """Save a panorama.
 
@@ -61,6 +64,8 @@ def save(
         When it was taken, ns since 1970.
     wraps
         Whether its right edge meets its left one.
+    orientation
+        What takes its rays to level ones; None for a level one.
 
     Returns
     -------
@@ -77,12 +82,12 @@ def save(
     name = path.stem if path.suffix.lower() in _SUFFIXES else path.name
     path = path.with_name(name + FORMATS[form])
     if form == 'gpano':
-        return [_write(path, gpano(image, surface, wraps))]
+        return [_write(path, gpano(image, surface, wraps, orientation))]
     description = {
         'image': path.name,
         'stamp_ns': stamp_ns,
         'taken': datetime.fromtimestamp(stamp_ns / 1e9, timezone.utc).isoformat(),
-        'projection': described(surface, wraps),
+        'projection': described(surface, wraps, orientation),
     }
     text = json.dumps(description, indent=2) + '\n'
     return [
@@ -91,16 +96,22 @@ def save(
     ]
 
 
-def gpano(image: np.ndarray, surface: Surface, wraps: bool = False) -> bytes:
-    """Return an equirectangular JPEG of a panorama, with its GPano tags.
+def gpano(
+    image: np.ndarray,
+    surface: Surface,
+    wraps: bool = False,
+    orientation: Quaternion | None = None,
+) -> bytes:
+    """Return a level equirectangular JPEG of a panorama, with its GPano tags.
 
     The tags are those of Google's Photo Sphere XMP Metadata. One that `wraps` is all around the
     sphere, without a gap at its edges.
     """
+    turn = attitude_of(*orientation) if orientation else LEVEL
     if wraps:
         image, surface = _repeated(image, surface)
-    sphere, left_px, top_px = on_sphere(surface)
-    equirectangular = RemapTable(surface, sphere, 'cubic')(image)
+    sphere, left_px, top_px = on_sphere(surface, turn)
+    equirectangular = RemapTable(surface, sphere, 'cubic', turn)(image)
     quality = (cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY)
     jpeg = cv2.imencode('.jpg', equirectangular, quality)[1].tobytes()
     full_px = round(2 * pi * sphere.focal_px)
@@ -124,12 +135,12 @@ def _repeated(image: np.ndarray, surface: Surface) -> tuple[np.ndarray, Surface]
     return image, surface.window(-beyond_px, 0, image.shape[1], surface.height)
 
 
-def on_sphere(surface: Surface) -> tuple[Surface, int, int]:
+def on_sphere(surface: Surface, turn: Attitude = LEVEL) -> tuple[Surface, int, int]:
     """Return the equirectangular part of the sphere that a panorama covers.
 
     Its scale is the panorama's own, rounded so that the sphere is a whole and even number of
     pixels around; bearing 0 is in the middle of the sphere. What a panorama holds beyond 180
-    degrees to a side is left out.
+    degrees to a side is left out. A panorama that is turned against the level covers more of it.
 
     Returns
     -------
@@ -142,7 +153,7 @@ def on_sphere(surface: Surface) -> tuple[Surface, int, int]:
     focal_px = around_px / (2 * pi)
     left, right, top, bottom = (
         angle * focal_px + around_px / share
-        for angle, share in zip(_limits(surface), (2, 2, 4, 4), strict=True)
+        for angle, share in zip(_limits(surface, turn), (2, 2, 4, 4), strict=True)
     )
     left_px, top_px = max(ceil(left), 0), max(ceil(top), 0)
     part = Surface(
@@ -156,14 +167,37 @@ def on_sphere(surface: Surface) -> tuple[Surface, int, int]:
     return part, left_px, top_px
 
 
-def _limits(surface: Surface) -> tuple[float, ...]:
+def _limits(surface: Surface, turn: Attitude) -> tuple[float, ...]:
     """Bearings of the outer edges, angles below the horizon of the upper and lower one, rad."""
+    if turn != LEVEL:
+        return _turned_limits(surface, turn)
     x = surface.center_x_px
     bearings = [(edge - x) / surface.focal_px for edge in (-0.5, surface.width - 0.5)]
     if not surface.yaw_is_column_shift:
         bearings = [atan(bearing) for bearing in bearings]
     rays = [surface.rays(x, edge) for edge in (-0.5, surface.height - 0.5)]
     return *bearings, *(atan2(down, hypot(right, ahead)) for right, down, ahead in rays)
+
+
+def _turned_limits(surface: Surface, turn: Attitude) -> tuple[float, ...]:
+    """The same of what a panorama covers that is turned."""
+    x = np.linspace(-0.5, surface.width - 0.5, _BORDER_POINTS)
+    y = np.linspace(-0.5, surface.height - 0.5, _BORDER_POINTS)
+    border = [surface.rays(x, edge) for edge in (y[0], y[-1])]
+    border += [surface.rays(edge, y) for edge in (x[0], x[-1])]
+    plain = np.concatenate(border)
+    level = plain @ turn.matrix.T
+    before, after = (np.arctan2(rays[:, 0], rays[:, 2]) for rays in (plain, level))
+    if surface.yaw_is_column_shift:
+        columns = np.concatenate([x, x, np.repeat(x[[0, -1]], len(y))])
+        before_full = (columns - surface.center_x_px) / surface.focal_px
+    else:
+        before_full = before
+    # Not past the back: how far a bearing is turned is less than half around.
+    bearings = before_full + (after - before + pi) % (2 * pi) - pi
+    down = np.arctan2(level[:, 1], np.hypot(level[:, 0], level[:, 2]))
+    sides = max(bearings.min(), -pi), min(bearings.max(), pi)
+    return *map(float, sides), float(down.min()), float(down.max())
 
 
 def with_xmp(jpeg: bytes, tags: dict[str, object]) -> bytes:

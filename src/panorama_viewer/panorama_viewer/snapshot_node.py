@@ -11,14 +11,17 @@ from rclpy.node import Node
 
 from fisheye_bridge.command_line import own_words
 from fisheye_bridge.projection import surface_of
-from fisheye_bridge.qos import LATCHED
+from fisheye_bridge.qos import LATCHED_INPUT
 from fisheye_bridge.running import spin_until, started
 from fisheye_bridge.stamps import ns_of
 from fisheye_bridge.topics import ImageSubscription
 from fisheye_core.encodings import to_opencv
 from fisheye_core.errors import FisheyeError, SettingError, SourceError
 from fisheye_geometry.surface import Surface
+from panorama_viewer.projection import Quaternion, StateHistory, turned
 from panorama_viewer.snapshot import FORMATS, save
+
+Taken = tuple[np.ndarray, Surface, int, bool, Quaternion | None]
 
 
 class SnapshotNode(Node):
@@ -28,28 +31,31 @@ class SnapshotNode(Node):
     ----------
     taken : tuple or None
         Image (height, width[, 3]) uint8, BGR or grey; its surface; its stamp, ns; whether its
-        edges meet.
+        edges meet; what takes it to the level, None if it is level.
     """
 
     def __init__(self, **kwargs):
         super().__init__('snapshot', **kwargs)
-        self.taken: tuple[np.ndarray, Surface, int, bool] | None = None
-        self._surface: Surface | None = None
-        self._wraps = False
-        self.create_subscription(Projection, 'panorama/projection', self._place, LATCHED)
+        self.taken: Taken | None = None
+        self._projections: StateHistory[Projection] = StateHistory()
+        self.create_subscription(Projection, 'panorama/projection', self._place, LATCHED_INPUT)
         self._image = ImageSubscription(self, 'panorama/image', self._take)
 
     def _place(self, message) -> None:
-        self._surface, self._wraps = surface_of(message), message.wraps
+        self._projections.add(ns_of(message.header.stamp), message)
 
     def _take(self, image, encoding, header) -> None:
-        surface = self._surface
+        stamp_ns = ns_of(header.stamp)
+        projection = self._projections.at(stamp_ns)
+        if projection is None:
+            return
+        surface, q = surface_of(projection), projection.orientation
         # Behind a new projection there may still be a picture of the old one.
-        if surface and image.shape[1::-1] == (surface.width, surface.height):
-            picture = to_opencv(image, encoding)
-            self.taken = picture, surface, ns_of(header.stamp), self._wraps
+        if image.shape[1::-1] == (surface.width, surface.height):
+            picture, level = to_opencv(image, encoding), turned(q.x, q.y, q.z, q.w)
+            self.taken = picture, surface, stamp_ns, projection.wraps, level
 
-    def wait(self, timeout_s: float) -> tuple[np.ndarray, Surface, int, bool]:
+    def wait(self, timeout_s: float) -> Taken:
         """Spin until a panorama was taken; a `SourceError` if none comes."""
         spin_until(self, lambda: self.taken is not None, timeout_s)
         if self.taken is None:

@@ -16,12 +16,12 @@ from fisheye_bridge.diagnostics import ERROR, Diagnostics
 from fisheye_bridge.network import addresses
 from fisheye_bridge.parameters import Parameters
 from fisheye_bridge.projection import surface_of
-from fisheye_bridge.qos import IMAGE_INPUT, LATCHED
+from fisheye_bridge.qos import IMAGE_INPUT, LATCHED, LATCHED_INPUT
 from fisheye_bridge.running import run
 from fisheye_bridge.stamps import ns_of
 from fisheye_core.errors import FisheyeError, OverlapError
 from panorama_viewer.certificate import fingerprint, tls_of
-from panorama_viewer.projection import described
+from panorama_viewer.projection import Quaternion, StateHistory, described, turned
 from panorama_viewer.server import ViewerServer
 from panorama_viewer.settings import ViewerSettings
 from panorama_viewer.status import ViewerStatus, measured
@@ -46,8 +46,10 @@ class ViewerNode(Node):
         self._status = ViewerStatus()
         self._image = None
         self._faults: list[str] = []
+        self._levels: StateHistory[Quaternion | None] = StateHistory()
+        self._told: dict[str, Any] | None = None
         for kind, topic, take, qos in (
-            (Projection, 'panorama/projection', self._take_projection, LATCHED),
+            (Projection, 'panorama/projection', self._take_projection, LATCHED_INPUT),
             (Overlaps, 'panorama/overlap', self._take_overlaps, LATCHED),
             (DiagnosticArray, '/diagnostics', self._take_diagnostics, 10),
         ):
@@ -119,7 +121,8 @@ class ViewerNode(Node):
     def _take_image(self, message) -> None:
         delay_ns = self.get_clock().now().nanoseconds - ns_of(message.header.stamp)
         self._status.picture(monotonic(), delay_ns / 1e9)
-        self._server.show(message.data.tobytes())
+        orientation = self._levels.at(ns_of(message.header.stamp))
+        self._server.show(message.data.tobytes(), orientation)
 
     def _take_projection(self, message) -> None:
         try:
@@ -127,7 +130,12 @@ class ViewerNode(Node):
         except FisheyeError as error:
             self.get_logger().warning(f'panorama/projection refused: {error}')
             return
-        self._server.tell(projection=described(surface, message.wraps))
+        q = message.orientation
+        self._levels.add(ns_of(message.header.stamp), turned(q.x, q.y, q.z, q.w))
+        projection = described(surface, message.wraps)
+        if projection != self._told:  # it comes with each panorama while the level changes
+            self._told = projection
+            self._server.tell(projection=projection)
 
     def _take_overlaps(self, message) -> None:
         self._server.tell(overlaps=[_entry(overlap) for overlap in message.overlaps])

@@ -49,7 +49,7 @@ def test_a_panorama_is_taken_with_its_surface_and_any_stamp(context, stamp_ns):
         executor.spin_once(timeout_sec=0.02)
         if node.taken:
             break
-    taken, surface, taken_ns, wraps = node.taken
+    taken, surface, taken_ns, wraps, _ = node.taken
     np.testing.assert_array_equal(taken, PANORAMA)
     assert (surface, taken_ns, wraps) == (SURFACE, stamp_ns, True)
     for ended in (node, stitching):

@@ -23,7 +23,7 @@ from fisheye_bridge.diagnostics import (
 from fisheye_bridge.imu import reading_of
 from fisheye_bridge.parameters import Parameters
 from fisheye_bridge.projection import projection_of
-from fisheye_bridge.qos import BEST_EFFORT_INPUT, LATCHED
+from fisheye_bridge.qos import LATCHED, SENSOR_INPUT
 from fisheye_core.errors import FisheyeError, SettingError
 from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.nodes.overlap_message import overlap_messages
@@ -106,7 +106,7 @@ class PanoramaBase(Node):
     def _follow_imu(self, settings: PanoramaOutputSettings) -> None:
         """Subscribe while the level is the imu's: its messages come by the hundred a second."""
         if settings.level == 'imu' and self._imu is None:
-            self._imu = self.create_subscription(Imu, 'imu', self._take_imu, BEST_EFFORT_INPUT)
+            self._imu = self.create_subscription(Imu, 'imu', self._take_imu, SENSOR_INPUT)
         elif settings.level != 'imu' and self._imu is not None:
             self.destroy_subscription(self._imu)
             self._imu = None

@@ -1,6 +1,7 @@
 """Gravity as a robot that moves feels it: at the time of each picture, and in the long run."""
 
 from collections import deque
+from collections.abc import Callable
 from math import degrees, exp, inf, radians
 from threading import Lock
 from time import monotonic
@@ -49,12 +50,14 @@ class GravityHistory:
     jump_deg : float
         By how much the IMU jumped from one message to the next, the last time.
     jumped_s : float
-        When that was, s of the monotonic clock.
+        When that was, s of the clock.
     apart_s : float
         How much later than the last reading the last picture was taken.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Callable[[], float] = monotonic):
+        """Start; `clock` gives the time, s."""
+        self._clock = clock
         self.jump_deg = self.apart_s = 0.0
         self.jumped_s = -inf
         self._moments: deque[_Moment] = deque(maxlen=_KEPT)
@@ -118,7 +121,7 @@ class GravityHistory:
             return False
         if self._doubted_ns is None:
             self._doubted_ns = reading.stamp_ns
-            self.jump_deg, self.jumped_s = degrees(off_rad), monotonic()
+            self.jump_deg, self.jumped_s = degrees(off_rad), self._clock()
         if (reading.stamp_ns - self._doubted_ns) * 1e-9 < _BELIEVED_S:
             return True
         self._doubted_ns = None

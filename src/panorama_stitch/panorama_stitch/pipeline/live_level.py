@@ -4,8 +4,8 @@ The panorama itself is levelled by where things fall in the long run. What the r
 seconds is told beside it, as its orientation, so that nobody has to build a table for it.
 """
 
-from collections.abc import Sequence
-from math import exp, radians
+from collections.abc import Callable, Sequence
+from math import radians
 from time import monotonic
 
 import numpy as np
@@ -19,8 +19,8 @@ from panorama_stitch.pipeline.gravity import GravityHistory, angle_rad
 from panorama_stitch.pipeline.panorama_settings import PanoramaOutputSettings
 from panorama_stitch.pipeline.rig_state import RigState
 
-_LONG_RUN_S = 10.0
-"""Over so long a robot drives level, or on one slope."""
+_LONG_RUN_S, _FIRST_S = 10.0, 1.0
+"""Over so long a robot drives level, or on one slope; and what has to do at first."""
 _TURNED_RAD, _PAUSE_S = radians(3.0), 5.0
 """A panorama is laid out anew where the slope has changed by so much, and not more often."""
 _SILENT_S = 2.0
@@ -29,36 +29,50 @@ _TOLD_S = 5.0
 
 
 class LiveLevel:
-    """Follows an IMU, and tells how each panorama is turned against the level."""
+    """Follows an IMU, and tells how each panorama is turned against the level.
 
-    def __init__(self, rig: RigState):
-        """Start; `rig` gets the gravity of the long run."""
-        self._rig = rig
-        self._history = GravityHistory()
+    Attributes
+    ----------
+    rig : RigState
+        Gets the gravity of the long run.
+    """
+
+    def __init__(self, rig: RigState, clock: Callable[[], float] = monotonic):
+        """Start; `rig` gets the gravity of the long run, `clock` gives the time, s."""
+        self.rig, self._clock = rig, clock
+        self._history = GravityHistory(clock)
         self._long_run: np.ndarray | None = None
         self._felt_s: float | None = None
-        self._used_s = -_PAUSE_S
+        self._used_s, self._age_s = -_PAUSE_S, 0.0
         self._levelled: Compositor | None = None
         self._from_robot = np.eye(3)
 
     def feel(self, reading: ImuReading) -> bool:
         """Add what an IMU says; return whether the rig's gravity is another one now."""
-        now_s = monotonic()
+        now_s = self._clock()
         since_s = now_s - self._felt_s if self._felt_s is not None else 0.0
         self._felt_s = now_s
         down = self._history.feel(reading)
         if down is None:
             return False
+        self._age_s += since_s
+        # At first it is the mean of all that was felt.
+        share = since_s / max(min(_LONG_RUN_S, self._age_s), 1e-9)
         former = down if self._long_run is None else self._long_run
-        mean = former + (1 - exp(-since_s / _LONG_RUN_S)) * (down - former)
+        mean = former + min(share, 1.0) * (down - former)
         self._long_run = mean / max(float(np.linalg.norm(mean)), 1e-9)
-        gravity = self._rig.gravity
-        if gravity is not None and (
-            angle_rad(gravity, self._long_run) < _TURNED_RAD or now_s - self._used_s < _PAUSE_S
-        ):
+        if self._age_s < _FIRST_S or not self._is_other(now_s):
             return False
-        self._rig.gravity, self._used_s = self._long_run, now_s
+        self.rig.gravity, self._used_s = self._long_run, now_s
         return True
+
+    def _is_other(self, now_s: float) -> bool:
+        """Whether the slope is another one than the panorama was laid out for."""
+        gravity = self.rig.gravity
+        if gravity is None or self._long_run is None:
+            return True
+        turned_rad = angle_rad(gravity, self._long_run)
+        return turned_rad > _TURNED_RAD and now_s - self._used_s > _PAUSE_S
 
     def orientation(
         self,
@@ -89,11 +103,11 @@ class LiveLevel:
         if down is None or any(view.shift_px[0] for view in compositor.views):
             return None
         if compositor is not self._levelled:
-            robot = self._rig.solve(overlaps, settings, level='symmetric').rig.cameras[0]
+            robot = self.rig.solve(overlaps, settings, level='symmetric').rig.cameras[0]
             drawn = compositor.views[0].attitude.matrix
             self._from_robot, self._levelled = drawn @ robot.attitude.matrix.T, compositor
         # What a user turns on top of the level is no fault of the level.
-        extra = self._rig.extra(settings).matrix
+        extra = self.rig.extra(settings).matrix
         turn = level_turn(extra.T @ self._from_robot @ down)
         return Attitude.of(extra @ turn @ extra.T)
 
@@ -101,11 +115,11 @@ class LiveLevel:
         """Return what is wrong with the IMU, in sentences, for `level:=imu`."""
         if self._felt_s is None:
             return ['level is imu, but nothing came on the topic imu; level is symmetric so far']
-        silent_s = monotonic() - self._felt_s
+        silent_s = self._clock() - self._felt_s
         if silent_s > _SILENT_S:
             return [f'nothing came on the topic imu for {silent_s:.0f} s; the last level is held']
         history = self._history
-        if monotonic() - history.jumped_s < _TOLD_S:
+        if self._clock() - history.jumped_s < _TOLD_S:
             return [
                 f'the imu jumped by {history.jump_deg:.0f} degrees from one message to the next; '
                 'the level before was held'

@@ -3,8 +3,8 @@
 
 /**
  * How each kind of surface maps rays, in focal lengths from its centre: ray (a, b) => [x, y, z],
- * point [x, y, z] => [a, b] or null, the latter once more as GLSL for the shader, and whether
- * its columns are bearings, so that it can lead all around.
+ * point [x, y, z] => [a, b] or null, both once more as GLSL for the shader, and whether its
+ * columns are bearings, so that it can lead all around.
  */
 export const SURFACES = {
   cylindrical: {
@@ -12,18 +12,21 @@ export const SURFACES = {
     ray: (a, b) => [Math.sin(a), b, Math.cos(a)],
     point: ([x, y, z]) => [Math.atan2(x, z), y / Math.hypot(x, z)],
     shader: 'vec2(atan(ray.x, ray.z), ray.y / length(ray.xz))',
+    unfold: 'vec3(sin(point.x), point.y, cos(point.x))',
   },
   equirectangular: {
     columnsAreBearings: true,
     ray: (a, b) => [Math.cos(b) * Math.sin(a), Math.sin(b), Math.cos(b) * Math.cos(a)],
     point: ([x, y, z]) => [Math.atan2(x, z), Math.atan2(y, Math.hypot(x, z))],
     shader: 'vec2(atan(ray.x, ray.z), atan(ray.y, length(ray.xz)))',
+    unfold: 'vec3(cos(point.y) * sin(point.x), sin(point.y), cos(point.y) * cos(point.x))',
   },
   rectilinear: {
     columnsAreBearings: false,
     ray: (a, b) => [a, b, 1],
     point: ([x, y, z]) => (z > 0 ? [x / z, y / z] : null),
     shader: 'ray.z > 0.0 ? ray.xy / ray.z : vec2(1e9)',
+    unfold: 'vec3(point, 1.0)',
   },
 };
 

@@ -32,6 +32,7 @@ export class Live {
     this.heard = performance.now();
     this.isRefused = false;
     this.attempts += 1;
+    this.orientation = null;
     this.on.opened();
     const offered = ['panorama', ...(this.takesVideo() ? ['h264'] : []),
       ...(this.token.value ? [`token.${this.token.value}`] : [])];
@@ -58,12 +59,18 @@ export class Live {
     this.heard = performance.now();
     this.attempts = 0;
     if (typeof data === 'string') {
+      const message = JSON.parse(data);
+      // What takes the pictures that follow to the level comes alone, in front of them.
+      if (Object.hasOwn(message, 'orientation')) {
+        this.orientation = message.orientation;
+        return;
+      }
       this.say('heard', socket);
-      this.on.state(JSON.parse(data));
+      this.on.state(message);
       return;
     }
     try {
-      await this.on.picture(data);
+      await this.on.picture(data, this.orientation);
     } finally {
       // A picture that could not be drawn does not keep the next one away.
       this.say('drawn', socket);

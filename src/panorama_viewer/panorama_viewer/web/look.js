@@ -5,14 +5,18 @@ import { SURFACES } from '/geometry.js';
 const VERTEX = `
   attribute vec2 corner;
   varying vec2 point;
-  uniform vec2 reach;
+  uniform vec2 reach, middle;
   void main() {
-    point = corner * reach;
+    point = corner * reach + middle;
     gl_Position = vec4(corner.x, -corner.y, 0.0, 1.0);
   }`;
 
 const CASES = Object.values(SURFACES).map(
   ({ shader }, kind) => `if (kind == ${kind}) return ${shader};`,
+);
+
+const RAYS = Object.values(SURFACES).map(
+  ({ unfold }, kind) => `if (kind == ${kind}) return ${unfold};`,
 );
 
 const FRAGMENT = `
@@ -21,15 +25,20 @@ const FRAGMENT = `
   uniform sampler2D panorama;
   uniform mat3 turn;
   uniform int kind;
-  uniform bool wraps;
+  uniform bool wraps, isFlat;
   uniform vec2 center, size, share;
   uniform float focal;
   vec2 place(vec3 ray) {
     ${CASES.join('\n    ')}
     return vec2(1e9);
   }
+  vec3 unfold(vec2 point) {
+    ${RAYS.join('\n    ')}
+    return vec3(0.0, 0.0, -1.0);
+  }
   void main() {
-    vec2 where = (center + focal * place(turn * vec3(point, 1.0)) + 0.5) / size;
+    vec3 ray = isFlat ? vec3(point, 1.0) : unfold(point);
+    vec2 where = (center + focal * place(turn * ray) + 0.5) / size;
     if (wraps) where.x = fract(where.x);
     bool inside = all(greaterThanEqual(where, vec2(0.0))) && all(lessThanEqual(where, vec2(1.0)));
     gl_FragColor = inside ? texture2D(panorama, where * share) : vec4(0.063, 0.082, 0.106, 1.0);
@@ -79,20 +88,39 @@ export class Look {
     this.shown = null;
   }
 
+  /** Draw what a view of a panorama shows. */
   draw(bitmap, projection, view) {
+    const { gl, canvas } = this;
+    const focal = view.focal(canvas.width, canvas.height);
+    const [right, down, ahead] = [view.ray(1, 0), view.ray(0, 1), view.ray(0, 0)];
+    const ray = [0, 1, 2];
+    gl.uniform1i(this.at('isFlat'), true);
+    gl.uniform2f(this.at('reach'), canvas.width / 2 / focal, canvas.height / 2 / focal);
+    gl.uniform2f(this.at('middle'), 0, 0);
+    gl.uniformMatrix3fv(this.at('turn'), false, [
+      ...ray.map((i) => right[i] - ahead[i]), ...ray.map((i) => down[i] - ahead[i]), ...ahead,
+    ]);
+    this.fill(bitmap, projection);
+  }
+
+  /** Draw a panorama on its own surface, by rows of a rotation of its rays to level ones. */
+  turn(bitmap, projection, rows) {
+    const { gl } = this;
+    const { width, height, focal_px: focal, center_x_px: x, center_y_px: y } = projection;
+    gl.uniform1i(this.at('isFlat'), false);
+    gl.uniform2f(this.at('reach'), width / 2 / focal, height / 2 / focal);
+    gl.uniform2f(this.at('middle'), ((width - 1) / 2 - x) / focal, ((height - 1) / 2 - y) / focal);
+    gl.uniformMatrix3fv(this.at('turn'), false, rows); // as columns: the way back
+    this.fill(bitmap, projection);
+  }
+
+  fill(bitmap, projection) {
     const { gl, canvas } = this;
     if (bitmap !== this.shown) {
       gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGB, gl.RGB, gl.UNSIGNED_BYTE, bitmap);
       this.shown = bitmap;
     }
-    const focal = view.focal(canvas.width, canvas.height);
-    const [right, down, ahead] = [view.ray(1, 0), view.ray(0, 1), view.ray(0, 0)];
-    const ray = [0, 1, 2];
     gl.viewport(0, 0, canvas.width, canvas.height);
-    gl.uniform2f(this.at('reach'), canvas.width / 2 / focal, canvas.height / 2 / focal);
-    gl.uniformMatrix3fv(this.at('turn'), false, [
-      ...ray.map((i) => right[i] - ahead[i]), ...ray.map((i) => down[i] - ahead[i]), ...ahead,
-    ]);
     gl.uniform1i(this.at('kind'), Object.keys(SURFACES).indexOf(projection.surface));
     gl.uniform1i(this.at('wraps'), projection.wraps);
     gl.uniform2f(this.at('center'), projection.center_x_px, projection.center_y_px);

@@ -113,10 +113,10 @@ const live = new Live(token, () => !status.obstacle, {
     status.take({ ...state, problems });
     screen.aids.take(state);
   },
-  async picture(data) {
+  async picture(data, orientation) {
     const image = await pictures.image(data, screen.projection, screen.widest);
     if (!image) return;
-    await screen.show(image);
+    await screen.show(image, orientation);
     status.picture();
   },
   lost: (reason) => status.lose(reason),

@@ -2,6 +2,7 @@
 
 import { Aids } from '/aids.js';
 import { Projection, View, anglesOf } from '/geometry.js';
+import { Level } from '/level.js';
 import { Look } from '/look.js';
 import { Scale } from '/scale.js';
 import { Whole } from '/whole.js';
@@ -16,6 +17,7 @@ export class Screen {
     this.scale = new Scale($('scale'));
     this.whole = new Whole($('whole'));
     this.map = new Whole($('map'));
+    this.level = new Level();
     this.aids = new Aids(this);
     this.projection = this.bitmap = this.pointer = this.frame = null;
     try {
@@ -50,8 +52,9 @@ export class Screen {
     this.arrange();
   }
 
-  /** Show a picture, settled when it is on the screen. */
-  async show(bitmap) {
+  /** Show a picture, levelled; settled when it is on the screen. */
+  async show(plain, orientation = null) {
+    const bitmap = this.level.levelled(plain, this.projection, orientation);
     this.bitmap?.close();
     this.bitmap = bitmap;
     await this.redraw();

@@ -1,0 +1,34 @@
+// A panorama of a robot that nods, turned until it is level: the whole page shows it so.
+
+import { Look } from '/look.js';
+
+export class Level {
+  /** Return the picture as it would be on the same surface, were it level; uses the bitmap up. */
+  levelled(bitmap, projection, orientation) {
+    if (!orientation || !projection) return bitmap;
+    try {
+      this.look ??= new Look(new OffscreenCanvas(1, 1));
+    } catch {
+      return bitmap; // without WebGL it is shown as it is
+    }
+    const { canvas } = this.look;
+    const { displayWidth = bitmap.width, displayHeight = bitmap.height } = bitmap;
+    const [across, down] = projection.share(bitmap);
+    const [width, height] = [Math.round(across * displayWidth), Math.round(down * displayHeight)];
+    if (canvas.width !== width || canvas.height !== height) {
+      [canvas.width, canvas.height] = [width, height];
+    }
+    this.look.turn(bitmap, projection, matrix(orientation));
+    bitmap.close();
+    return canvas.transferToImageBitmap();
+  }
+}
+
+/** Rows of the rotation of a unit quaternion [x, y, z, w], one behind the other. */
+function matrix([x, y, z, w]) {
+  return [
+    1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w),
+    2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w),
+    2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y),
+  ];
+}
