@@ -83,17 +83,18 @@ def print_nodes_header() -> None:
     print(f'\nPublished system: {published} panoramas a second.')
     print(
         'nodes                             Hz   p50   p95   p99 ms  lost missing '
-        ' CPU ms   MiB  first s  calibration s'
+        ' CPU ms   MiB  first s  calibration s  views Hz, p99 ms'
     )
 
 
 def print_run(run: Run) -> None:
     """Print one row."""
     missing = '-' if run.missing is None else run.missing
+    views = '-' if run.view_hz is None else f'{run.view_hz:.1f}, {run.view_p99_ms:.1f}'
     print(
         f'{run.name:30s} {run.rate_hz:5.1f} {run.p50_ms:5.1f} {run.p95_ms:5.1f} {run.p99_ms:5.1f} '
         f'{run.lost:8d} {missing!s:>7s} {run.cpu_ms:7.1f} {run.memory_mib:5.0f} '
-        f'{run.first_s:8.1f} {run.calibration_s:14.1f}',
+        f'{run.first_s:8.1f} {run.calibration_s:14.1f}  {views}',
         flush=True,
     )
 

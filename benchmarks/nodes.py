@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from known_rigs import KnownRig, folder_rig, synthetic_rig
+from sensor_msgs.msg import Image
 from targets import Requirement
 
 from fisheye_capture.capture_settings import CaptureSettings
@@ -21,9 +22,10 @@ from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.camera_file import Camera, write_camera
 from fisheye_testing.health import usage
+from fisheye_testing.image_message import stamp_ns
 from fisheye_testing.rig import RigProcesses, unused_domain
 from fisheye_testing.waiting import wait_for
-from fisheye_testing.watcher import Watcher
+from fisheye_testing.watcher import IMAGE_INPUT, Watcher
 
 FULL_SPEED_HZ = 1000.0
 ONE_CORE = ('taskset', '--cpu-list', '0')
@@ -44,11 +46,16 @@ class Setup:
     """One of `known_rigs.SYNTHETIC_RIGS`, whose pictures are taken once and held in memory."""
     prefix: tuple[str, ...] = ()
     blend: str = 'feather'
+    views: tuple[str, ...] = ()
+    """Names of views of the node, each of 640x480."""
+    are_watched: bool = False
+    """Whether somebody subscribes to them."""
     most: dict[str, float] = field(default_factory=dict)
     least: dict[str, float] = field(default_factory=dict)
 
 
 SMALL, LARGE = (640, 480), (1280, 960)
+VIEWS = 'front', 'left_view', 'right_view', 'rear'
 SETUPS = (
     Setup(
         'one node 640x480, full speed',
@@ -62,6 +69,8 @@ SETUPS = (
     Setup('one node 1280x960, full speed', LARGE, least={'rate_hz': 40}),
     Setup('one node 1280x960, 30 Hz', LARGE, 30.0),
     Setup('the same with flow, 1280x960', LARGE, 30.0, blend='flow'),
+    Setup('four views, nobody looks, 30 Hz', SMALL, 30.0, views=VIEWS),
+    Setup('four views of 640x480, 30 Hz', SMALL, 30.0, views=VIEWS, are_watched=True),
     Setup('four cameras, full speed', SMALL, rig='ring4', least={'rate_hz': 40}),
     Setup('four cameras, 30 Hz', SMALL, 30.0, rig='ring4', most={'memory_mib': 384}),
     Setup('five nodes 640x480, 30 Hz', SMALL, 30.0, False, most={'p99_ms': 50, 'missing': 0}),
@@ -69,6 +78,8 @@ SETUPS = (
 )
 
 
+_PLAIN = 'one node 640x480, 30 Hz'
+_SILENT_VIEWS = ('four views, nobody looks, 30 Hz',)
 _FLOW_MS = (
     ('the same with flow, 640x480', 'one node 640x480, 30 Hz', 8.0),
     ('the same with flow, 1280x960', 'one node 1280x960, 30 Hz', 20.0),
@@ -98,6 +109,9 @@ class Run:
         Resident memory of the largest node.
     calibration_s
         For an answer of calibrate_overlap; of a ring: from the first panorama until it is closed.
+    view_hz, view_p99_ms
+        Of the slowest view that is watched: pictures a second, and the 99th percentile of the
+        latency; None where none is.
     """
 
     name: str
@@ -111,6 +125,33 @@ class Run:
     cpu_ms: float
     memory_mib: float
     calibration_s: float
+    view_hz: float | None = None
+    view_p99_ms: float | None = None
+
+
+class ViewRate:
+    """Counts the pictures of a view, and how late they come."""
+
+    def __init__(self, watcher: Watcher, view: str):
+        self._latencies_ms: list[float] = []
+        watcher.node.create_subscription(Image, f'{view}/image_raw', self._take, IMAGE_INPUT)
+
+    def restart(self) -> None:
+        """Forget what came so far."""
+        self._latencies_ms = []
+
+    @property
+    def count(self) -> int:
+        """Pictures that came."""
+        return len(self._latencies_ms)
+
+    @property
+    def p99_ms(self) -> float:
+        """99th percentile of the latency, ms."""
+        return float(np.percentile(self._latencies_ms, 99)) if self._latencies_ms else np.inf
+
+    def _take(self, message: Image) -> None:
+        self._latencies_ms.append((time.time_ns() - stamp_ns(message.header)) / 1e6)
 
 
 class Counts:
@@ -160,6 +201,11 @@ def node_targets(runs: Sequence[Run]) -> list[Requirement]:
         if {name, feather} <= set(p99_ms):
             later_ms = max(0.0, p99_ms[name] - p99_ms[feather])
             targets.append(Requirement(f'{name}, p99_ms later', later_ms, limit))
+    cpu_ms = {run.name: run.cpu_ms for run in runs}
+    for name in _SILENT_VIEWS:
+        if {name, _PLAIN} <= set(cpu_ms):
+            ratio = cpu_ms[name] / cpu_ms[_PLAIN]
+            targets.append(Requirement(f'{name}, CPU beside none', ratio, 1.05))
     return targets
 
 
@@ -177,6 +223,8 @@ def run_rig(setup: Setup, seconds: float, log_folder: Path) -> Run:
         values = {'frame_rate_hz': setup.frame_rate_hz}
         if setup.composed:
             values['blend'] = setup.blend
+        if setup.views:
+            values['views'] = f'[{", ".join(setup.views)}]'
         rig.start_all(setup.composed, cameras, setup.prefix, **values)
         wait_for(lambda: rig.check_alive() or watcher.newest, START_TIMEOUT_S, 'a first panorama')
         first_s = time.monotonic() - begin
@@ -186,12 +234,16 @@ def run_rig(setup: Setup, seconds: float, log_folder: Path) -> Run:
             begin = time.monotonic()
             watcher.calibrate()
         calibration_s = time.monotonic() - begin
+        views = [ViewRate(watcher, view) for view in setup.views if setup.are_watched]
         time.sleep(SETTLE_S)
         watcher.restart()
+        for view in views:
+            view.restart()
         counts.restart()
         before_s, begin = cpu_s(rig.processes.values()), time.monotonic()
         time.sleep(seconds)
         stamps_ns, latencies_ms = watcher.stamps_ns[:], watcher.latencies_ms[:]
+        views_hz = [view.count / (time.monotonic() - begin) for view in views]
         used_s, passed_s = cpu_s(rig.processes.values()) - before_s, time.monotonic() - begin
         rig.check_alive()
         due = round((stamps_ns[-1] - stamps_ns[0]) * 1e-9 * setup.frame_rate_hz) + 1
@@ -206,6 +258,8 @@ def run_rig(setup: Setup, seconds: float, log_folder: Path) -> Run:
             cpu_ms=used_s / len(stamps_ns) * 1e3,
             memory_mib=max(usage(process.pid).resident_mib for process in rig.processes.values()),
             calibration_s=calibration_s,
+            view_hz=min(views_hz, default=None),
+            view_p99_ms=max((view.p99_ms for view in views), default=None),
         )
 
 

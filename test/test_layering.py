@@ -58,7 +58,6 @@ KEYS = {
     'av': 'python3-av',
     'pytest': 'python3-pytest',
     'hypothesis': 'python3-hypothesis',
-    'pupil_apriltags': 'python3-pupil-apriltags-pip',
 }
 SHARED_SHELL = 'panorama_stitch.nodes.base_node'
 """The one node module that others build on: what stitch_node and panorama_node share."""

@@ -17,7 +17,9 @@ from fisheye_capture.scene import Scene
 from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.surface import Surface
 from fisheye_testing.image_message import to_array
+from fisheye_testing.rig import RigProcesses, unused_domain
 from fisheye_testing.waiting import wait_for
+from fisheye_testing.watcher import Watcher
 
 START_S = 40.0
 FAITHFUL_DB = 24.0
@@ -52,7 +54,32 @@ class Consumer:
             self.node.destroy_subscription(subscription)
 
 
-@pytest.fixture
+@pytest.fixture(scope='module')
+def domain():
+    return unused_domain()
+
+
+@pytest.fixture(scope='module')
+def watcher(domain):
+    with Watcher(domain) as watcher:
+        yield watcher
+
+
+@pytest.fixture(scope='module')
+def rig(domain, watcher, tmp_path_factory):
+    """Run a panorama node with views of many kinds."""
+    with RigProcesses(domain, tmp_path_factory.mktemp('log')) as rig:
+        rig.start(
+            'panorama',
+            views='[front, right_view, rear, ptz]',
+            **{'right_view.pitch_deg': -10.0, 'ptz.width': 320, 'ptz.height': 240},
+        )
+        wait_for(lambda: rig.check_alive() or watcher.is_measured, START_S, 'a measured overlap')
+        yield rig
+        rig.check_alive()
+
+
+@pytest.fixture(scope='module')
 def diagnosed(watcher):
     """Return the newest status of each node, by name."""
     newest = {}
@@ -64,7 +91,7 @@ def diagnosed(watcher):
     return newest
 
 
-@pytest.fixture
+@pytest.fixture(scope='module')
 def set_parameters(watcher):
     """Return a function that sets parameters of the panorama node and gives what it answers."""
     client = watcher.node.create_client(SetParameters, '/panorama/set_parameters')
@@ -86,11 +113,6 @@ def set_parameters(watcher):
     return change
 
 
-def start(rig, watcher, **parameters):
-    rig.start('panorama', **parameters)
-    wait_for(lambda: rig.check_alive() or watcher.is_measured, START_S, 'a measured overlap')
-
-
 def truth(info, image, yaw_deg, pitch_deg=0.0):
     lens = lens_of(info)
     plane = Surface(
@@ -105,7 +127,6 @@ def psnr(a, b):
 
 
 def test_a_detector_gets_what_it_needs(rig, watcher, diagnosed):
-    start(rig, watcher, views='[front, right_view, rear]', **{'right_view.pitch_deg': -10.0})
     front, side = Consumer(watcher.node, 'front'), Consumer(watcher.node, 'right_view')
     for consumer, yaw_deg, pitch_deg in ((front, 0, 0), (side, 90, -10)):
         wait_for(consumer.both, START_S, f'a pair of {consumer.view}')
@@ -126,19 +147,20 @@ def test_a_detector_gets_what_it_needs(rig, watcher, diagnosed):
     rear = Consumer(watcher.node, 'rear')
     words = 'rear: the rig does not see'
     wait_for(lambda: words in diagnosed['panorama'].message, START_S, 'a WARN')
-    assert not to_array(rear.both()[0])[200:280, 300:340].any(), 'black where nothing is seen'
+    image, _ = wait_for(rear.both, START_S, 'a pair of rear')
+    assert not to_array(image)[200:280, 300:340].any(), 'black where nothing is seen'
+    for consumer in (front, side, rear):
+        consumer.leave()
 
 
 def test_nothing_is_drawn_while_nobody_subscribes(rig, watcher, diagnosed):
-    start(rig, watcher, views='[front]')
     key = 'front rate Hz'
 
     def rate():
         status = diagnosed.get('panorama')
         return status and {entry.key: entry.value for entry in status.values}.get(key)
 
-    wait_for(lambda: 'panorama' in diagnosed, START_S, 'a report')
-    assert rate() is None
+    wait_for(lambda: 'panorama' in diagnosed and rate() is None, START_S, 'a report')
     consumer = Consumer(watcher.node, 'front')
     wait_for(lambda: float(rate() or 0) > 5, START_S, 'a rate')
     consumer.leave()
@@ -146,8 +168,7 @@ def test_nothing_is_drawn_while_nobody_subscribes(rig, watcher, diagnosed):
 
 
 def test_views_and_their_parameters_change_while_the_node_runs(rig, watcher, set_parameters):
-    start(rig, watcher)
-    (result,) = set_parameters(views=['front'])
+    (result,) = set_parameters(views=['front', 'ptz'])
     assert result.successful, result.reason
     consumer = Consumer(watcher.node, 'front')
     wait_for(consumer.both, START_S, 'a pair')
@@ -160,15 +181,15 @@ def test_views_and_their_parameters_change_while_the_node_runs(rig, watcher, set
     assert (image.width, image.height, info.height) == (320, 200, 200)
     assert psnr(to_array(image), truth(info, image, 40)) > FAITHFUL_DB - 3, 'finer than the lens'
     for values, words in (
-        ({'front__hfov_deg': 0.0}, 'front.hfov_deg is 0; expected 1 to 170'),
-        ({'front__hfov_deg': 179.0}, 'front.hfov_deg is 179; expected 1 to 170'),
+        ({'front__hfov_deg': 0.0}, 'front.hfov_deg'),
+        ({'front__hfov_deg': 179.0}, 'front.hfov_deg'),
         ({'views': [f'v{i}' for i in range(20)]}, 'views has 20 names; expected up to 8'),
         ({'views': ['left']}, "views has 'left', whose topics are those of a camera already"),
     ):
         (result,) = set_parameters(**values)
         assert not result.successful
         assert words in result.reason
-    assert all(result.successful for result in set_parameters(views=['other']))
+    assert all(result.successful for result in set_parameters(views=['other', 'ptz']))
     wait_for(
         lambda: (
             not watcher.node.count_publishers('/front/image_raw')
@@ -177,11 +198,9 @@ def test_views_and_their_parameters_change_while_the_node_runs(rig, watcher, set
         START_S,
         'the other view',
     )
-    rig.check_alive()
 
 
 def test_a_view_is_steered(rig, watcher, diagnosed):
-    start(rig, watcher, views='[ptz]')
     consumer = Consumer(watcher.node, 'ptz')
     wait_for(consumer.both, START_S, 'a pair')
     look = watcher.node.create_publisher(Vector3Stamped, 'ptz/look', 1)
@@ -195,10 +214,10 @@ def test_a_view_is_steered(rig, watcher, diagnosed):
 
     before = consumer.both()[0].header.stamp
     turn(60, -10, 50)
-    focal_px = 320 / np.tan(np.radians(25))
+    focal_px = 160 / np.tan(np.radians(25))
     wait_for(lambda: abs(consumer.both()[1].k[0] - focal_px) < 0.01, START_S, 'the turn')
     passed = [info.k[0] for stamp, info in sorted(consumer.infos.items()) if stamp > ns_of(before)]
-    between = [focal for focal in passed if 330 < focal < focal_px - 10]
+    between = [focal for focal in passed if 162 < focal < focal_px - 5]
     assert len(between) >= 3, 'smooth, and camera_info follows picture by picture'
     image, info = consumer.both()
     assert psnr(to_array(image), truth(info, image, 60, -10)) > FAITHFUL_DB - 3
@@ -206,7 +225,6 @@ def test_a_view_is_steered(rig, watcher, diagnosed):
     words = 'x of look is nan; expected a finite number of rad'
     wait_for(lambda: words in diagnosed['panorama'].message, START_S, 'a WARN')
     turn(179, 0, 90)
-    wait_for(lambda: abs(consumer.both()[1].k[0] - 320) < 0.01, START_S, 'the limit')
+    wait_for(lambda: abs(consumer.both()[1].k[0] - 160) < 0.01, START_S, 'the limit')
     image, info = consumer.both()
     assert to_array(image).any(axis=2).all(), 'limited to what the rig sees'
-    rig.check_alive()

@@ -27,6 +27,7 @@ MODULES = {
     'empy': 'em',
     'opencv-python-headless': 'cv2',
     'pillow': 'PIL',
+    'pupil-apriltags': 'pupil_apriltags',
     'pytest-xdist': 'xdist',
     'pyyaml': 'yaml',
 }
@@ -86,7 +87,8 @@ def missing_beside_ros():
     prefixes = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
     # What is added may be older than in requirements.txt, so as to go with the NumPy of ROS.
     missing = [f'numpy=={importlib.metadata.version("numpy")}']
-    for name, version in re.findall(r'^([\w-]+).*?==(\S+)', REQUIREMENTS.read_text(), re.M):
+    lines = re.findall(r'^([\w-]+).*?==(\S+)( ; [^#\n]*)?', REQUIREMENTS.read_text(), re.M)
+    for name, version, only_on in lines:
         package = name.replace('ros-jazzy-', '').replace('-', '_')
         if name.startswith('ros-jazzy-'):
             if not any(Path(prefix, 'share', package).exists() for prefix in prefixes):
@@ -98,7 +100,7 @@ def missing_beside_ros():
             if not shutil.which('cmake'):
                 stop('cmake is missing: sudo apt install cmake')
         elif not importlib.util.find_spec(MODULES.get(name, name)):
-            missing.append(f'{name}<={version}')
+            missing.append(f'{name}<={version}{only_on.rstrip()}')
     return missing
 
 

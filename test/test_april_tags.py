@@ -6,15 +6,24 @@ from functools import lru_cache
 import cv2
 import numpy as np
 import pytest
-from test_virtual_view import camera_at, deg
 
 from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.attitude import Attitude, angle_between
 from fisheye_geometry.rig import Rig, RigCamera
 from panorama_stitch.compose.build import Style, build_compositor
 from panorama_stitch.compose.posing import views_of_rig
+from panorama_stitch.compose.virtual_camera import VirtualCamera
 from panorama_stitch.compose.virtual_view import VirtualView
 from panorama_stitch.pipeline.panorama_settings import PanoramaSettings
+
+
+def deg(*angles):
+    return Attitude(*np.radians(angles))
+
+
+def camera_at(yaw_deg, pitch_deg, hfov_deg, size):
+    return VirtualCamera(*np.radians((yaw_deg, pitch_deg, hfov_deg)), *size)
+
 
 LENS = synthetic_lens(960, 720, np.radians(170))
 MOUNTS = deg(-70, -4, 2), deg(70, -4, -3)
