@@ -112,7 +112,11 @@ def of_stitch(arguments):
     """Return the parameters of a node that makes the panorama."""
     names = arguments['cameras']
     usual = ','.join(names) == ARGUMENTS['cameras'][0]  # params_file may know better
-    return {'cameras': '' if usual else names, 'overlap_file': arguments['overlap_file']}
+    return {
+        'cameras': '' if usual else names,
+        'overlap_file': arguments['overlap_file'],
+        'views': arguments['views'],
+    }
 
 
 def separate(arguments):

@@ -24,6 +24,7 @@ ARGUMENTS = {
     'transport': ('', 'how pictures are taken from topics: raw, compressed or video'),
     'frame_rate_hz': ('', 'frames a second of each camera'),
     'overlap_file': ('', 'where the overlap is read at start and saved on request'),
+    'views': ('', 'names of views for detectors, with commas between them: front,rear'),
     'view': ('false', 'also show the panorama in a browser'),
     'host': ('', 'address on which browsers are served; 0.0.0.0 for other machines too'),
     'transforms': ('false', 'also publish where the optical frames of the cameras point'),
@@ -81,9 +82,10 @@ def checked(arguments: dict[str, str], cameras: list[str]) -> dict[str, Any]:
         raise SettingError(f"params_file is '{paths['params_file']}', which is not a file")
     rate = arguments['frame_rate_hz']
     rates = {'frame_rate_hz': number('frame_rate_hz', rate)} if rate else {}
+    views = [name.strip() for name in arguments['views'].split(',')] if arguments['views'] else ''
     # Those of cameras that are not declared are there only if they were given.
     own = {name: arguments.get(name, '') for name in arguments_of(cameras)}
-    return {**arguments, **own, **flags, **paths, **rates, 'cameras': cameras}
+    return {**arguments, **own, **flags, **paths, **rates, 'cameras': cameras, 'views': views}
 
 
 def flag(name: str, text: str) -> bool:

@@ -8,6 +8,12 @@ import yaml
 
 PACKAGE = Path(__file__).parents[1]
 TOPICS = {
+    '/front/camera_info',
+    '/front/image_raw',
+    '/front/image_raw/compressed',
+    '/rear/camera_info',
+    '/rear/image_raw',
+    '/rear/image_raw/compressed',
     '/diagnostics',
     '/left/image_raw/compressed',
     '/left/image_rect',

@@ -7,4 +7,7 @@ agree best), `fade` and `blend` (how they meet there), `optical_flow` and `flow`
 meet, too), `blends` (the table of these ways), `brightness` and `gain` (how they become equally
 bright), `compositor` (all of it, frame after frame). `mask` tells where a camera sees the robot
 itself.
+
+A view for a detector is drawn beside it: `virtual_camera` (where it looks), `shares` (which camera
+shows which of its pixels), `virtual_parts` and `virtual_view` (how they are drawn and blended).
 """

@@ -32,7 +32,7 @@ class VirtualCamera:
 
     @property
     def attitude(self) -> Attitude:
-        """Takes rays of the camera to rays of the panorama's frame."""
+        """Attitude of the camera: it takes its rays to rays of the panorama's frame."""
         return Attitude(self.yaw_rad, self.pitch_rad)
 
     @property

@@ -1,5 +1,7 @@
 """The views of a node: those that its parameter names, and their parameters."""
 
+from time import monotonic
+
 from rclpy.node import Node
 
 from fisheye_bridge.diagnostics import WARN, Report
@@ -9,6 +11,9 @@ from fisheye_core.errors import FisheyeError
 from panorama_stitch.nodes.view_publisher import ViewPublisher
 from panorama_stitch.pipeline.panorama import Panorama
 from panorama_stitch.pipeline.view_settings import ViewSettings
+
+_ASK_S = 0.2
+"""Asking for subscribers takes as long for a few views as drawing one."""
 
 
 class Views:
@@ -28,6 +33,8 @@ class Views:
         self._transforms = TransformPublisher(node)
         self._declared: dict[str, Parameters] = {}
         self._views: dict[str, ViewPublisher] = {}
+        self._subscribed: list[ViewPublisher] = []
+        self._asked_s = -_ASK_S
         self._is_following = False
         self._follow()
         # Only once a change is taken: parameters of views cannot be declared while others are set.
@@ -36,7 +43,7 @@ class Views:
     @property
     def wanted(self) -> bool:
         """Whether anybody subscribes to any of them."""
-        return any(view.wanted for view in list(self._views.values()))
+        return bool(self._wanted())
 
     @property
     def stabilised(self) -> bool:
@@ -45,9 +52,8 @@ class Views:
 
     def take(self, panorama: Panorama) -> None:
         """Hand a panorama to those that somebody subscribes to."""
-        for view in list(self._views.values()):
-            if view.wanted:
-                view.take(panorama)
+        for view in self._wanted():
+            view.take(panorama)
 
     def report(self, report: Report) -> None:
         """Report of each view."""
@@ -61,6 +67,14 @@ class Views:
         for view in self._views.values():
             view.stop()
 
+    def _wanted(self) -> list[ViewPublisher]:
+        """Return those that somebody subscribes to, as far as that was asked of late."""
+        now_s = monotonic()
+        if now_s - self._asked_s > _ASK_S:
+            self._asked_s = now_s
+            self._subscribed = [view for view in list(self._views.values()) if view.wanted]
+        return self._subscribed
+
     def _changed(self, _) -> None:
         if not self._is_following:  # declaring parameters sets them
             try:
@@ -73,6 +87,7 @@ class Views:
         self._is_following = True
         try:
             names = self._node.settings.views
+            self._subscribed, self._asked_s = [], -_ASK_S
             for name in set(self._views) - set(names):
                 self._views.pop(name).stop()
             for name in names:
