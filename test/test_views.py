@@ -139,10 +139,11 @@ def test_a_detector_gets_what_it_needs(rig, watcher, diagnosed):
         assert list(info.k) == pytest.approx([320, 0, 319.5, 0, 320, 239.5, 0, 0, 1])
         assert psnr(to_array(image), truth(info, image, yaw_deg, pitch_deg)) > FAITHFUL_DB
     jpegs = []
-    watcher.node.create_subscription(
+    coded = watcher.node.create_subscription(
         CompressedImage, 'front/image_raw/compressed', jpegs.append, 5
     )
     wait_for(lambda: jpegs, START_S, 'a JPEG')
+    watcher.node.destroy_subscription(coded)
     assert jpegs[0].format == 'bgr8; jpeg compressed bgr8'
     rear = Consumer(watcher.node, 'rear')
     words = 'rear: the rig does not see'

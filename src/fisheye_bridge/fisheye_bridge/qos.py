@@ -19,6 +19,9 @@ VIDEO_INPUT = QoSProfile(depth=30, reliability=ReliabilityPolicy.RELIABLE)
 BEST_EFFORT_INPUT = QoSProfile(depth=3, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Where the publisher is not ours: this meets a reliable one and a best-effort one."""
 
+COMMAND = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
+"""What is told once has to arrive, and only the last counts."""
+
 SENSOR_INPUT = QoSProfile(depth=20, reliability=ReliabilityPolicy.BEST_EFFORT)
 """What comes by the hundred a second: a moment without the processor loses none, and after a
 longer one the newest are what counts."""

@@ -7,6 +7,7 @@ from fisheye_geometry.attitude import (
     LEVEL,
     Attitude,
     angle_between,
+    attitude_of,
     quaternion,
     rotation_matrix,
     rotation_vector,
@@ -62,3 +63,5 @@ def test_a_quaternion_is_the_same_rotation(attitude):
     matrix = np.eye(3) + 2 * w * across + 2 * across @ across
     assert w >= 0
     assert matrix == pytest.approx(attitude.matrix, abs=1e-7)
+    assert attitude_of(x, y, z, w).matrix == pytest.approx(attitude.matrix, abs=1e-7)
+    assert attitude_of(-x, -y, -z, -w).matrix == pytest.approx(attitude.matrix, abs=1e-7)

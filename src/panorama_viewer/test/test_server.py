@@ -251,3 +251,26 @@ def test_a_name_that_cannot_be_one_is_a_sentence():
     server = unserved(host='....', port=0)
     with pytest.raises(SettingError, match=r'cannot serve on port 0 of \.\.\.\.: '):
         server.start()
+
+
+def test_what_levels_a_picture_comes_before_it_and_once(serve):
+    server = serve()
+    nod = (0.1, 0.0, 0.0, 0.995)
+
+    async def look(session):
+        came = []
+        async with session.ws_connect(address(server, 'live')) as stream:
+            shown = [(b'plain', None), (b'turned', nod), (b'again', nod), (b'level', None)]
+            for jpeg, orientation in shown:
+                server.show(jpeg, orientation)
+                async for message in stream:
+                    if message.type is aiohttp.WSMsgType.BINARY:
+                        came.append(message.data)
+                        break
+                    if 'orientation' in message.json():
+                        came.append(message.json()['orientation'])
+                await stream.send_str('drawn')
+        return came
+
+    came = visit(look)
+    assert came == [b'plain', list(nod), b'turned', b'again', None, b'level']

@@ -9,7 +9,9 @@ from fisheye_msgs.msg import Projection
 
 from fisheye_bridge.projection import surface_of
 from fisheye_core.errors import FileAccessError
+from fisheye_geometry.attitude import Attitude, quaternion
 from fisheye_geometry.surface import Surface
+from panorama_viewer.projection import StateHistory, turned
 from panorama_viewer.snapshot import gpano, on_sphere, save
 
 SURFACES = [
@@ -151,3 +153,41 @@ def test_a_file_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / 'file').touch()
     with pytest.raises(FileAccessError, match=r'file/here\.png cannot be written'):
         save(tmp_path / 'file' / 'here', 'png', np.zeros((480, 1200)), SURFACES[0], STAMP_NS)
+
+
+@pytest.mark.parametrize('surface', SURFACES[:2], ids=lambda surface: surface.kind)
+def test_a_panorama_of_a_robot_that_nods_is_saved_level(surface):
+    nod = Attitude(*np.radians((0.0, 9.0, -4.0)))
+    y, x = np.ogrid[: surface.height, : surface.width]
+    height = -(surface.rays(x, y) @ nod.matrix.T)[..., 1]
+    image = np.where(height > 0, 200, 60).astype(np.uint8)
+    jpeg = gpano(image, surface, orientation=quaternion(nod))
+    tags = xmp(jpeg)
+    sphere = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_GRAYSCALE)
+    horizon = int(tags['FullPanoHeightPixels']) // 2 - int(tags['CroppedAreaTopPixels'])
+    inner = slice(round(0.2 * sphere.shape[1]), round(0.8 * sphere.shape[1]))
+    assert (sphere[horizon - 20 : horizon - 1, inner] > 150).all()
+    assert (sphere[horizon + 1 : horizon + 20, inner] < 110).all()
+    assert (sphere[[0, -1]] < 30).mean() > 0.5, 'all that it covers, up to its tips'
+
+
+def test_the_orientation_is_beside_a_png(tmp_path):
+    nod = quaternion(Attitude(0.0, 0.2, 0.1))
+    image = np.zeros((480, 1200, 3), np.uint8)
+    paths = save(tmp_path / 'here', 'png', image, SURFACES[0], STAMP_NS, False, nod)
+    told = json.loads(paths[1].read_text())['projection']['orientation']
+    assert [told[axis] for axis in 'xyzw'] == pytest.approx(list(nod))
+
+
+def test_a_picture_gets_the_state_of_its_stamp():
+    history = StateHistory()
+    assert history.at(5) is None
+    for stamp_ns, state in ((10, 'a'), (20, 'b')):
+        history.add(stamp_ns, state)
+    assert [history.at(stamp_ns) for stamp_ns in (10, 15, 20, 99)] == ['a', 'a', 'b', 'b']
+    assert history.at(5) == 'b', 'a recording that begins again: the newest'
+
+
+@pytest.mark.parametrize('given', [(0, 0, 0, 1), (0, 0, 0, -1), (0, 0, 0, 0), (np.nan, 0, 0, 1)])
+def test_a_level_panorama_is_not_turned(given):
+    assert turned(*map(float, given)) is None

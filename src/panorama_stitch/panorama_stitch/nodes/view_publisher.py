@@ -9,7 +9,7 @@ from fisheye_bridge.camera_info import camera_info_of
 from fisheye_bridge.diagnostics import ERROR, WARN, DropCounter, Report
 from fisheye_bridge.images import ImageBuffer
 from fisheye_bridge.parameters import Parameters
-from fisheye_bridge.qos import BEST_EFFORT_INPUT, IMAGE
+from fisheye_bridge.qos import COMMAND, IMAGE
 from fisheye_bridge.stamps import stamp_of
 from fisheye_bridge.topics import ImagePublisher
 from fisheye_bridge.transforms import TransformPublisher, transform
@@ -61,7 +61,7 @@ class ViewPublisher:
         self._image = ImagePublisher(node, f'{name}/image_raw')
         self._info = node.create_publisher(CameraInfo, f'{name}/camera_info', IMAGE)
         self._look = node.create_subscription(
-            Vector3Stamped, f'{name}/look', self._take_look, BEST_EFFORT_INPUT
+            Vector3Stamped, f'{name}/look', self._take_look, COMMAND
         )
         self._worker: LatestOnlyWorker[Panorama] = LatestOnlyWorker(
             self._publish, f'view {name}', on_error=self._failed
