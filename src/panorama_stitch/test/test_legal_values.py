@@ -14,10 +14,13 @@ from fisheye_capture.synthetic import synthetic_lens
 from fisheye_core.errors import FisheyeError
 from fisheye_core.settings import rules
 from fisheye_geometry.attitude import Attitude
+from fisheye_geometry.level import Mount
 from panorama_stitch.compose.blends import BLENDS
+from panorama_stitch.compose.virtual_view import VirtualView
 from panorama_stitch.pipeline.panorama_settings import PanoramaOutputSettings, PanoramaSettings
 from panorama_stitch.pipeline.rig_measurement import measure_overlaps
 from panorama_stitch.pipeline.rig_state import RigState
+from panorama_stitch.pipeline.view_settings import ViewSettings
 
 CHANGES = 5000 if os.environ.get('LONG') else 1000
 LENS = synthetic_lens(96, 72, np.radians(170))
@@ -27,6 +30,8 @@ MEASURED = 0.02
 DRAWN = 0.5
 """Of the changes, at least: the rest asks for what no surface can hold."""
 LARGEST_PX = 1e9
+VIEWS = 'front', 'rear', 'a/b', 'v4', 'v5', 'v6', 'v7', 'v8'
+LARGEST_VIEW_PX = 160
 
 
 @pytest.fixture(scope='module')
@@ -64,6 +69,8 @@ def legal(chance, kind, default, rule):
         low, high = rule.minimum, rule.maximum
         values = [low, high, chance.uniform(low, high), low + (high - low) * chance.random() ** 4]
         return kind(chance.choice([*values, nan] if rule.nan else values))
+    if kind == tuple[str, ...]:
+        return tuple(chance.sample(VIEWS, chance.randint(0, len(VIEWS))))
     nearby = chance.uniform(-2 * LENS.width, 2 * LENS.width)
     far = chance.choice([-1, 1]) * LARGEST_PX ** chance.random()
     return (chance.choice([nan, nearby, float(round(nearby)), far]),)
@@ -93,6 +100,29 @@ def test_random_legal_values_of_every_live_parameter(pictures, seed):
             settings = replace(settings, **{name: default})
             counts['refused'] += 1
     assert counts['drawn'] > DRAWN * CHANGES / 2, counts
+
+
+@pytest.mark.parametrize('moves', [False, True])
+def test_random_legal_values_of_views(pictures, moves):
+    chance, settings = random.Random(3), PanoramaSettings(feather_deg=40.0)
+    mounts = [Mount(yaw, 0.0, 0.0) for yaw in (-YAW / 2, YAW / 2)]
+    stitcher = RigState(settings.cameras, mounts)
+    place(stitcher, settings)
+    for blend in BLENDS:
+        compositor = stitcher.compositor(replace(settings, blend=blend), pictures)
+        for _ in range(CHANGES // 40):
+            values = {
+                name: legal(chance, kind, default, rule)
+                for name, (kind, default, rule) in rules(ViewSettings).items()
+            }
+            for side in ('width', 'height'):
+                values[side] = min(values[side], LARGEST_VIEW_PX)
+            camera = ViewSettings(**values).camera(chance.choice(VIEWS))
+            out = np.full((camera.height, camera.width, 3), 77, np.uint8)
+            view = VirtualView(compositor, camera.surface, camera.attitude, moves=moves)
+            view.draw(pictures, out)
+            if view.seen_share == 0:
+                assert not out.any()
 
 
 @pytest.mark.parametrize('blend', BLENDS)

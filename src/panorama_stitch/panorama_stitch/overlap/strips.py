@@ -51,6 +51,8 @@ def seam_frame(rotation: np.ndarray) -> np.ndarray:
     """Return the axes (3, 3), as columns, of the seam of two cameras that look outwards."""
     here, there = np.array([0.0, 0.0, 1.0]), rotation[:, 2]
     x = there - here
+    if np.linalg.norm(x) < 1e-6:  # both look the same way: the seam is any upright one
+        x = np.array([1.0, 0.0, 0.0])
     x /= np.linalg.norm(x)
     middle = here + there
     if np.linalg.norm(middle) < 0.1:  # back to back: any direction around is as good
