@@ -2,11 +2,14 @@
 
 import math
 import re
+import socket
 import subprocess
 import sys
 import threading
 from concurrent.futures import Future
+from contextlib import closing, suppress
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import cv2
 import numpy as np
@@ -425,6 +428,65 @@ def test_other_machines_need_https_for_h264(browser, serve, is_encrypted, tmp_pa
     page = Page(browser, server.url)
     expected = ('H.264', '') if is_encrypted else ('JPEG', 'this page was not opened by https')
     assert format_of(page) == expected
+
+
+class Relay:
+    """A way to a port on which nothing comes through for a while, without a word to either end."""
+
+    def __init__(self, port):
+        self._target, self._is_cut = ('127.0.0.1', port), False
+        self._listener = socket.create_server(('127.0.0.1', 0))
+        self.port = self._listener.getsockname()[1]
+        self._sockets = [self._listener]
+        self._run(self._accept)
+
+    def close(self):
+        for each in self._sockets:
+            with suppress(OSError):
+                each.shutdown(socket.SHUT_RDWR)
+            each.close()
+
+    def cut(self):
+        """Carry nothing from now on: neither what is open nor what comes."""
+        self._is_cut = True
+
+    def mend(self):
+        """Carry what comes new."""
+        self._is_cut = False
+
+    def _run(self, work, *arguments):
+        threading.Thread(target=work, args=arguments, daemon=True).start()
+
+    def _accept(self):
+        with suppress(OSError):
+            while True:
+                near, _ = self._listener.accept()
+                self._sockets.append(near)
+                if not self._is_cut:
+                    far = socket.create_connection(self._target)
+                    self._sockets.append(far)
+                    self._run(self._carry, near, far)
+                    self._run(self._carry, far, near)
+
+    def _carry(self, source, target):
+        with suppress(OSError):
+            while data := source.recv(65536):
+                if self._is_cut:
+                    return
+                target.sendall(data)
+            target.shutdown(socket.SHUT_WR)
+
+
+def test_the_page_comes_back_by_itself_when_its_link_was_silent(browser, serve):
+    server = serve(SURFACES[0], painted(SURFACES[0], 0, 0))
+    with closing(Relay(urlsplit(server.url).port)) as relay:
+        page = Page(browser, f'http://127.0.0.1:{relay.port}/')
+        page.until(lambda: page.text('condition') == 'Live', 'a live picture')
+        relay.cut()
+        page.until(lambda: 'no connection' in page.text('veil'), 'the loss')
+        relay.mend()
+        page.until(lambda: page.text('condition') == 'Live', 'a live picture')
+        assert page.text('format') == 'H.264'
 
 
 def test_the_delay_is_told_and_coloured(browser, serve):

@@ -7,6 +7,7 @@ from serving import address, picture, state, visit
 from fisheye_core.errors import VideoError
 from fisheye_core.video import video_decoder
 from panorama_viewer.feeds import DELTA, KEYFRAME
+from panorama_viewer.settings import ViewerSettings
 
 PROTOCOLS = ('panorama', 'h264')
 SIZE = 640, 240
@@ -68,6 +69,23 @@ def test_a_page_that_cannot_go_on_gets_a_keyframe(serve):
     visit(scenario)
 
 
+def test_a_bit_rate_that_is_set_applies_at_once(serve):
+    server = serve(video_bitrate_kbps=2000)
+
+    async def scenario(session):
+        async with look(session, server) as stream:
+            await state(stream, lambda _: True)
+            kinds = []
+            for number in range(4):
+                kinds.append((await shown(server, stream, number))[0])
+                await stream.send_str('drawn')
+                if number == 1:
+                    server.apply(ViewerSettings(video_bitrate_kbps=1500))
+            assert kinds == [KEYFRAME, DELTA, KEYFRAME, DELTA], 'the encoder was opened anew'
+
+    visit(scenario)
+
+
 def test_a_page_can_give_h264_up(serve):
     server = serve()
 
@@ -77,8 +95,7 @@ def test_a_page_can_give_h264_up(serve):
             assert (await shown(server, stream, 0))[0] == KEYFRAME
             await stream.send_str('jpeg')
             await stream.send_str('drawn')
-            server.tell(mark=1)
-            assert (await state(stream, lambda told: told['format'] == 'JPEG'))['mark']
+            await state(stream, lambda told: told['format'] == 'JPEG')
             server.show(jpeg(1)[1])
             assert await picture(stream) == jpeg(1)[1]
 

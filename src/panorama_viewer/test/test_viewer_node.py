@@ -302,6 +302,15 @@ def test_a_bug_in_the_page_stands_in_the_diagnostics_and_the_rest_goes_on(ros, m
     assert look(node) == JPEG
 
 
+def test_the_bit_rate_is_live_within_its_range(ros):
+    node = viewer(ros, port=0)
+    ros.start(node)
+    for kbps, is_taken in ((500, True), (10, False)):
+        (result,) = node.set_parameters([Parameter('video_bitrate_kbps', value=kbps)])
+        assert result.successful == is_taken
+    assert 'Min: 100, Max: 100000' in result.reason
+
+
 def test_a_port_that_cannot_be_had_is_a_sentence(ros):
     first = viewer(ros, port=0)
     ros.start(first)

@@ -1,8 +1,8 @@
 // The connection to the viewer: state and pictures; it comes back by itself.
 
 const SILENT_MS = 1500; // the server tells its state twice a second
-const CONNECT_MS = 500; // a first packet that got lost would be sent again after a second
-const MOST_CONNECT_MS = 4000;
+const CONNECT_MS = 400; // a first packet that got lost would be sent again after a second
+const MOST_CONNECT_MS = 4000; // also for a first connection
 const ATTEMPTS = 10; // before a connection gets more time
 const LOOK_MS = 100;
 const REFUSED = 1008; // the close code for a token that is missing or wrong
@@ -18,6 +18,7 @@ export class Live {
     this.on = on;
     this.isRefused = false;
     this.attempts = 0;
+    this.connected_ms = MOST_CONNECT_MS; // what it took to connect
     this.open();
     setInterval(() => this.watch(), LOOK_MS);
     // Who does not look leaves the place and the link to others.
@@ -39,6 +40,8 @@ export class Live {
     const address = `${location.protocol.replace('http', 'ws')}//${location.host}/live`;
     const socket = new WebSocket(address, offered);
     socket.binaryType = 'arraybuffer';
+    const begin = performance.now();
+    socket.onopen = () => { this.connected_ms = performance.now() - begin; };
     socket.onmessage = ({ data }) => this.take(socket, data);
     socket.onclose = ({ code, reason }) => {
       if (socket !== this.socket) return;
@@ -80,7 +83,8 @@ export class Live {
   /** How long the connection may be silent, ms: it comes up at once where there is a link. */
   get patience() {
     if (this.socket.readyState === WebSocket.OPEN) return SILENT_MS;
-    return Math.min(CONNECT_MS * 2 ** Math.floor(this.attempts / ATTEMPTS), MOST_CONNECT_MS);
+    const usual = Math.max(CONNECT_MS, 2 * this.connected_ms);
+    return Math.min(usual * 2 ** Math.floor(this.attempts / ATTEMPTS), MOST_CONNECT_MS);
   }
 
   /** Open a new connection in place of one that has ended, has gone silent or does not come up. */
