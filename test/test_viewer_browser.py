@@ -394,6 +394,8 @@ def test_a_browser_that_cannot_show_h264_shows_jpeg_and_says_why(
     page = Page(browser, server.url)
     page.until(lambda: page.text('format') == 'JPEG', 'JPEG')
     assert format_of(page) == ('JPEG', reason)
+    page.find('format').click()
+    page.until(lambda: page.text('answer') == reason, 'the reason in words')
     shown_deg = page.point('whole', *patch(page, 'whole', MAGENTA).mean(axis=0))
     assert shown_deg == pytest.approx(31.0, abs=CLOSE_DEG)
 

@@ -1,5 +1,7 @@
 // What the viewer knows, in words: the line at the top, the problems, the veil over a dead picture.
 
+import { say } from '/buttons.js';
+
 const $ = (id) => document.getElementById(id);
 const SLOW = 0.8; // of the rate: below it this browser does not keep up
 const WINDOW_MS = 2000;
@@ -13,6 +15,8 @@ export class Status {
     this.obstacle = ''; // why this browser cannot show H.264
     this.drawn = []; // when pictures were drawn, ms
     setInterval(() => this.show(), 250);
+    // Fingers cannot point at a title.
+    $('format').addEventListener('click', () => $('format').title && say($('format').title));
   }
 
   /** Note that a picture was drawn. */
