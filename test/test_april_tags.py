@@ -111,7 +111,7 @@ def detector():
 
 @pytest.mark.parametrize(
     ('bearing_deg', 'height_deg'),
-    [(-140, 0), (-62, 12), (-8, 0), (0, 0), (3, 8), (110, -5), (142, 0)],
+    [(-140, 0), (-62, 12), (0, 0), (3, 8), (142, -5)],
 )
 def test_a_detector_finds_the_pose_of_a_tag_wherever_it_is(detector, bearing_deg, height_deg):
     rotation, place = pose(bearing_deg, height_deg)

@@ -23,7 +23,7 @@ from fisheye_testing.waiting import wait_for
 
 START_S = 60.0
 LEVEL_DEG = 0.5
-SHOTS = 6
+SHOTS = 4
 """Of the page, one after the other, each of another picture: what is right by chance is not so
 often. A machine without time for the IMU's messages may have to try again."""
 IMUS = [True, False] if os.environ.get('LONG') == '1' else [True]

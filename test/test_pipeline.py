@@ -159,6 +159,12 @@ def test_the_one_node_takes_cameras_that_other_nodes_read(rig, watcher, transpor
         ('stitch', {'blend': 'soft'}, "blend is 'soft'; expected one of"),
         ('stitch', {'cameras': '[left, left]'}, 'expected 1 to 8 different names'),
         ('panorama', {'left.source': 'gone.mp4'}, "'gone.mp4' is not there"),
+        ('panorama', {'views': '[left]'}, "views has 'left', whose topics are those of a camera"),
+        (
+            'panorama',
+            {'views': '[front]', 'front.hfov_deg': 179},
+            'front.hfov_deg is 179; expected 1 to 170',
+        ),
     ],
 )
 def test_a_bad_start_is_a_sentence_and_exit_1(rig, node, parameters, words):

@@ -17,7 +17,7 @@ from fisheye_capture.scene import Scene
 from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.surface import Surface
 from fisheye_testing.image_message import to_array
-from fisheye_testing.rig import RigProcesses, unused_domain
+from fisheye_testing.rig import RigProcesses, camera_parameters, unused_domain
 from fisheye_testing.waiting import wait_for
 from fisheye_testing.watcher import Watcher
 
@@ -229,3 +229,16 @@ def test_a_view_is_steered(rig, watcher, diagnosed):
     wait_for(lambda: abs(consumer.both()[1].k[0] - 160) < 0.01, START_S, 'the limit')
     image, info = consumer.both()
     assert to_array(image).any(axis=2).all(), 'limited to what the rig sees'
+
+
+def test_stitch_node_has_views_too(tmp_path):
+    domain = unused_domain()
+    with RigProcesses(domain, tmp_path) as rig, Watcher(domain) as watcher:
+        rig.start_all(False, camera_parameters(None))
+        rig.stop('stitch')
+        rig.start('stitch', views='[front, right_view]')
+        wait_for(lambda: rig.check_alive() or watcher.is_measured, START_S, 'a measured overlap')
+        for view, yaw_deg in (('front', 0), ('right_view', 90)):
+            consumer = Consumer(watcher.node, view)
+            image, info = wait_for(consumer.both, START_S, f'a pair of {view}')
+            assert psnr(to_array(image), truth(info, image, yaw_deg)) > FAITHFUL_DB - 2, 'twice'

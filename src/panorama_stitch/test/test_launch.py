@@ -158,6 +158,12 @@ def test_the_file_of_parameters_must_be_there(rig, tmp_path):
     assert {node.parameters[0] for node in nodes.values()} == {str(path)}
 
 
+def test_views_go_to_the_node_that_makes_the_panorama(rig):
+    for composed, name in (('false', 'stitch'), ('true', 'panorama')):
+        nodes, _ = rig.start(views='front, rear', composed=composed)
+        assert rig.given(nodes[name])['views'] == ['front', 'rear']
+
+
 def test_files_in_the_home(rig, tmp_path, monkeypatch):
     monkeypatch.setenv('HOME', str(tmp_path))
     nodes, _ = rig.start(overlap_file='~/overlap.yaml')

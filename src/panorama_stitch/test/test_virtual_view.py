@@ -110,7 +110,7 @@ def test_a_seam_has_the_blend_of_the_panorama(blend):
 def test_all_around_there_is_no_end(attitudes, moves):
     lens = LENS if len(attitudes) > 2 else WIDE
     compositor, images = rig_of(attitudes, is_closed=True, lens=lens)
-    for yaw_deg in range(-180, 180, 45):
+    for yaw_deg in range(-180, 180, 60):
         camera = camera_at(yaw_deg, 0, 80, (320, 160))
         view, out = drawn(compositor, images, camera, moves=moves)
         assert view.seen_share == 1
