@@ -8,8 +8,6 @@ from fisheye_msgs.msg import Overlaps, Projection
 from fisheye_msgs.srv import CalibrateOverlap
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
-from rclpy.subscription import Subscription
-from sensor_msgs.msg import Imu
 
 from fisheye_bridge.awaiting import awaitable
 from fisheye_bridge.diagnostics import (
@@ -20,12 +18,12 @@ from fisheye_bridge.diagnostics import (
     OverloadMonitor,
     Report,
 )
-from fisheye_bridge.imu import reading_of
 from fisheye_bridge.parameters import Parameters
 from fisheye_bridge.projection import projection_of
-from fisheye_bridge.qos import LATCHED, SENSOR_INPUT
+from fisheye_bridge.qos import LATCHED
 from fisheye_core.errors import FisheyeError, SettingError
 from panorama_stitch.compose.compositor import Compositor
+from panorama_stitch.nodes.imu_input import ImuInput
 from panorama_stitch.nodes.overlap_message import overlap_messages
 from panorama_stitch.nodes.panorama_publisher import (
     FRAME_ID,
@@ -72,8 +70,8 @@ class PanoramaBase(Node):
             self._calibrate,
             callback_group=MutuallyExclusiveCallbackGroup(),
         )
-        self._imu: Subscription | None = None
-        self._follow_imu(declared.settings)
+        self._imu = ImuInput(self, self.pipeline.feel)
+        self._imu.follow(declared.settings.level == 'imu')
         self._diagnostics = Diagnostics(self, self._report)
         self._thread = Thread(target=self._publish_panoramas, name='compose', daemon=True)
         self._thread.start()
@@ -101,19 +99,7 @@ class PanoramaBase(Node):
 
     def _apply(self, settings: PanoramaOutputSettings) -> None:
         self.pipeline.apply(settings)
-        self._follow_imu(settings)
-
-    def _follow_imu(self, settings: PanoramaOutputSettings) -> None:
-        """Subscribe while the level is the imu's: its messages come by the hundred a second."""
-        if settings.level == 'imu' and self._imu is None:
-            self._imu = self.create_subscription(Imu, 'imu', self._take_imu, SENSOR_INPUT)
-        elif settings.level != 'imu' and self._imu is not None:
-            self.destroy_subscription(self._imu)
-            self._imu = None
-
-    def _take_imu(self, message: Imu) -> None:
-        if reading := reading_of(message):
-            self.pipeline.feel(reading)
+        self._imu.follow(settings.level == 'imu')
 
     def _publish_panoramas(self) -> None:
         """Publish each panorama that the pipeline has, until it is stopped."""
