@@ -62,7 +62,15 @@ class Connection(asyncio.Protocol):
         self.transport.abort()
 
     def unconfirmed(self) -> int:
-        """Return how many bytes the other machine has not confirmed; 0 where nobody can tell."""
+        """Return how many bytes the other machine has not confirmed; 0 where nobody can tell.
+
+        Raises
+        ------
+        ConnectionResetError
+            If the connection has ended.
+        """
+        if self.transport.is_closing():
+            raise ConnectionResetError('the client has left')
         reply = bytes(4)
         with suppress(OSError):
             reply = fcntl.ioctl(self.transport.get_extra_info('socket'), TIOCOUTQ, reply)
