@@ -12,7 +12,7 @@ from itertools import islice
 NOMINAL_HZ = 30.0
 """Pictures a second that the encoder counts with."""
 _LEAST_KBPS = 100.0
-_PICTURE_KBIT, _LEAST_HZ = 33.0, 10.0
+_PICTURE_KBIT, _LEAST_HZ = 25.0, 10.0
 """With less a picture is hardly worth having: the rate of pictures goes down instead, at first."""
 _SLACK_S, _MOST_JITTER_S = 0.04, 0.1
 """What a picture may be late against the fastest one of the last seconds: so long, and what two in
@@ -23,7 +23,9 @@ _WINDOW_S, _WINDOWS = 0.25, 3
 _BAD, _GOOD = 0.1, 0.05
 """Shares of pictures left out."""
 _UNDER, _RISE = 0.95, 1.2
-_PAUSE_S, _LONGEST_PAUSE_S = 3.0, 60.0
+_LOWEST = 0.4
+"""What is left of the bit rate at least: a single stall is no measure of a link."""
+_PAUSE_S, _LONGEST_PAUSE_S = 2.0, 60.0
 """Between two rises. Each begins with a keyframe."""
 _IN_VAIN_S = 3.0
 
@@ -116,8 +118,8 @@ class PagePace:
             return
         shares = [max(0.0, 1 - taken / offered) for offered, taken in self._windows]
         if min(shares) > 0 and sum(shares) > _WINDOWS * _BAD:
-            share = (shares[-2] + shares[-1]) / 2
-            self.kbps = max(_LEAST_KBPS, self.kbps * (1 - share) * _UNDER)
+            left = 1 - (shares[-2] + shares[-1]) / 2
+            self.kbps = max(_LEAST_KBPS, self.kbps * max(_LOWEST, left * _UNDER))
             is_in_vain = now_s - self._risen_s < _IN_VAIN_S
             self._pause_s = min(2 * self._pause_s, _LONGEST_PAUSE_S) if is_in_vain else _PAUSE_S
             self._settle(now_s)
