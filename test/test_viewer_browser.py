@@ -432,7 +432,7 @@ def test_other_machines_need_https_for_h264(browser, serve, is_encrypted, tmp_pa
     assert format_of(page) == expected
 
 
-class Relay:
+class SilentRelay:
     """A way to a port on which nothing comes through for a while, without a word to either end."""
 
     def __init__(self, port):
@@ -481,7 +481,7 @@ class Relay:
 
 def test_the_page_comes_back_by_itself_when_its_link_was_silent(browser, serve):
     server = serve(SURFACES[0], painted(SURFACES[0], 0, 0))
-    with closing(Relay(urlsplit(server.url).port)) as relay:
+    with closing(SilentRelay(urlsplit(server.url).port)) as relay:
         page = Page(browser, f'http://127.0.0.1:{relay.port}/')
         page.until(lambda: page.text('condition') == 'Live', 'a live picture')
         relay.cut()
