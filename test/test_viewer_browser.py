@@ -476,7 +476,9 @@ class SilentRelay:
                 if self._is_cut:
                     return
                 target.sendall(data)
-            target.shutdown(socket.SHUT_WR)
+        if not self._is_cut:
+            with suppress(OSError):  # also where the other end broke off
+                target.shutdown(socket.SHUT_WR)
 
 
 def test_the_page_comes_back_by_itself_when_its_link_was_silent(browser, serve):
