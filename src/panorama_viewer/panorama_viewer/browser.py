@@ -92,8 +92,8 @@ class Browser:
     async def serve(self) -> None:
         """Serve until the browser leaves or is shown out."""
         self.wake()
-        coroutines = self._serve_news(), self._hear(), self._farewell()
-        parts = [asyncio.create_task(coroutine) for coroutine in coroutines]
+        work = self._serve_news, self._hear, self._farewell
+        parts = [asyncio.create_task(part()) for part in work]
         try:
             ended, _ = await asyncio.wait(parts, return_when=asyncio.FIRST_COMPLETED)
             for part in ended:
@@ -117,17 +117,16 @@ class Browser:
     async def _hear(self) -> None:
         async for message in self._stream:
             if message.data not in self._words:
-                expected = f'expected {", ".join(self._words)}'
+                reason = f'expected {", ".join(self._words)}'
                 code = WSCloseCode.UNSUPPORTED_DATA
-                await dismiss(self._stream, self._connection, code, expected)
+                await dismiss(self._stream, self._connection, code, reason)
                 return
             self._words[message.data]()
 
     def _drawn(self) -> None:
         if self._under_way:
-            now_s = _now_s()
-            self._feed.drawn(now_s)
-            self._way.drawn(now_s, self._under_way.popleft().came_s)
+            self._feed.drawn(_now_s())
+            self._way.drawn(_now_s(), self._under_way.popleft().came_s)
             self._watch_silence()
             self.wake()
 
@@ -151,12 +150,11 @@ class Browser:
             self._way.told(_now_s())
             await self._stream.send_json({**state, **self._own_state()})
         picture = self._picture()
-        if picture and picture is not self._seen and self._takes(picture):
+        if not picture or picture is self._seen:
+            return
+        if self._feed.takes(picture, _now_s(), self._connection.unconfirmed()):
             self._seen = picture
             await self._send(picture)
-
-    def _takes(self, picture: TimedJpeg) -> bool:
-        return self._feed.takes(picture, _now_s(), self._connection.unconfirmed())
 
     async def _send(self, picture: TimedJpeg) -> None:
         try:

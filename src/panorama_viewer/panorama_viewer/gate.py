@@ -21,9 +21,8 @@ from panorama_viewer.allowance import Allowance
 from panorama_viewer.connection import ANSWERED_WITHIN_S, Connection
 from panorama_viewer.faults import Faults
 
-MAX_STRANGERS = 128
-MAX_ENTERING = 128
-"""In the handshake of https, before they count as strangers."""
+MAX_STRANGERS, MAX_ENTERING = 128, 128
+"""The latter are in the handshake of https, before they count as strangers."""
 _BACKLOG = 128
 _AT_ONCE = 16
 """Connections taken before the pictures have their turn again."""
@@ -89,8 +88,8 @@ class Gate:
             self._loop.remove_reader(listener)
             listener.close()
         self._listeners.clear()
-        for entering in self._entering:
-            entering.cancel()
+        for task in self._entering:
+            task.cancel()
         for stranger in list(self._strangers):
             stranger.abort()
         self._let_go(len(self._refused))
@@ -158,7 +157,7 @@ class Gate:
             taken.close()  # which nobody has done if it had not begun
 
     async def _enter(self, taken: socket.socket, source: str) -> None:
-        """Make a connection of a socket; who does not get through the handshake just goes."""
+        """Make a connection of a socket; who fails in the handshake just goes."""
         with suppress(OSError):
             await self._loop.connect_accepted_socket(
                 lambda: Connection(self, source, self._serve()),
