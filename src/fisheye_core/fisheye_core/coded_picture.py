@@ -14,6 +14,7 @@ from fisheye_core.quiet_jpeg import without_libjpeg_lines
 
 _PNG = b'\x89PNG\r\n\x1a\n'
 _JPEG = b'\xff\xd8'
+_HEIF_BRANDS = (b'heic', b'heix', b'hevc', b'heim', b'heis', b'mif1', b'msf1')
 _END = b'\xff\xd9'
 _SCAN = b'\xff\xda'
 _MAX_PIXELS = 50_000_000
@@ -114,8 +115,23 @@ def pixels_of(coded: np.ndarray, *, grey: bool = False) -> np.ndarray:
     with without_libjpeg_lines(), suppress(cv2.error):
         image = cv2.imdecode(coded, kind | cv2.IMREAD_IGNORE_ORIENTATION)
     if image is None:
-        raise ImageFormatError(f'{coded.size} bytes are a broken picture')
+        raise ImageFormatError(_why_not(coded))
     return image
+
+
+def _why_not(coded: np.ndarray) -> str:
+    """Return why a picture cannot be decoded to 8 bits."""
+    if coded[4:8].tobytes() == b'ftyp' and coded[8:12].tobytes() in _HEIF_BRANDS:
+        return (
+            'it is HEIC, which OpenCV cannot decode; expected JPEG, PNG or TIFF: convert it first'
+        )
+    image: np.ndarray | None = None
+    if coded.size:
+        with suppress(cv2.error):
+            image = cv2.imdecode(coded, cv2.IMREAD_UNCHANGED)
+    if image is not None:
+        return f'its pixels are {image.dtype}; expected whole numbers of 8 or 16 bits'
+    return f'{coded.size} bytes are a broken picture'
 
 
 def _check_claim(coded: np.ndarray) -> None:

@@ -71,8 +71,17 @@ def shown(value: Any) -> str:
     return f'{value!r:.80}'
 
 
-def write_mapping(path: str | Path, mapping: dict) -> None:
+def write_mapping(path: str | Path, mapping: dict, comment: str = '') -> None:
     """Write a mapping as YAML; readers see the old file or the new one, never a part.
+
+    Parameters
+    ----------
+    path
+        Where to.
+    mapping
+        What.
+    comment
+        Lines that stand before it.
 
     Raises
     ------
@@ -80,6 +89,7 @@ def write_mapping(path: str | Path, mapping: dict) -> None:
         If the file cannot be written.
     """
     text = yaml.safe_dump(mapping, sort_keys=False, default_flow_style=None, width=100)
+    text = ''.join(f'# {line}\n' for line in comment.splitlines()) + text
     try:
         replace_regular(path, text)
     except OSError as error:

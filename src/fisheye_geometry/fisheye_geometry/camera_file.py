@@ -58,8 +58,17 @@ def read_camera(path: str | Path) -> Camera:
         raise CameraFileError(error, path) from error
 
 
-def write_camera(path: str | Path, camera: Camera) -> None:
+def write_camera(path: str | Path, camera: Camera, comment: str = '') -> None:
     """Write a camera_info YAML file that `read_camera` and ROS's own tools read.
+
+    Parameters
+    ----------
+    path
+        Where to.
+    camera
+        What.
+    comment
+        Lines that stand before it.
 
     Raises
     ------
@@ -81,6 +90,7 @@ def write_camera(path: str | Path, camera: Camera) -> None:
             'rectification_matrix': _matrix(3, 3, camera.rectification),
             'projection_matrix': _matrix(3, 4, camera.projection_matrix.ravel()),
         },
+        comment,
     )
 
 
