@@ -3,31 +3,32 @@
 import argparse
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from fisheye_core.errors import FisheyeError, SettingError
-from fisheye_geometry.camera_file import Camera, write_camera
+from fisheye_geometry.camera_file import Camera, read_camera
+from fisheye_undistort.angle_map import lit_part
+from fisheye_undistort.calibrate_options import make_parser, target_of
+from fisheye_undistort.calibrated_angle import report_path
 from fisheye_undistort.calibration import calibrate
 from fisheye_undistort.collector import Collector
+from fisheye_undistort.conversion import convert
 from fisheye_undistort.detection import Detector
-from fisheye_undistort.pictures import HALVES, read_pictures
+from fisheye_undistort.gathering import Gathered, gather
+from fisheye_undistort.lens_difference import LensDifference
+from fisheye_undistort.pictures import read_pictures
 from fisheye_undistort.report import CalibrationReport
-from fisheye_undistort.target import KINDS, STANDARD, Target
+from fisheye_undistort.report_file import calibrated_line, write_report
+from fisheye_undistort.written_formats import write_as
 
 GOOD, FAILED, POOR = 0, 1, 2
 _INTERRUPTED = 130
 
 
-class _Parser(argparse.ArgumentParser):
-    def error(self, message):
-        raise SettingError(f'{message} (see {self.prog} --help)')
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; give its exit code: 0 good, 2 poor but written, 1 failed."""
     try:
-        return _run(_parser().parse_args(arguments))
+        return _run(make_parser(__doc__).parse_args(arguments))
     except FisheyeError as error:
         print(f'calibrate_lens: {error}', file=sys.stderr)
         return FAILED
@@ -35,79 +36,110 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _INTERRUPTED
 
 
-def _parser() -> _Parser:
-    parser = _Parser(
-        prog='calibrate_lens',
-        description=__doc__,
-        epilog='Exit code: 0 good, 2 poor but written, 1 failed (with the reason).',
-    )
-    add = parser.add_argument
-    add('pictures', nargs='*', help='pictures, folders, globs, videos')
-    add('--topic', help='collect views from this image topic, until there are --views or Ctrl-C')
-    add('--views', type=int, default=25, help='views that --topic collects (default: %(default)s)')
-    add('--half', choices=HALVES, default='', help='of pictures from a side-by-side stereo camera')
-    add('--print', metavar='SHEET', help='write the target as .pdf, .svg or .png, and do no more')
-    add('--target', choices=KINDS, default='circles', help='kind of target (default: %(default)s)')
-    add('--rows', type=int, help='circles, inner corners; of a ChArUco board: squares')
-    add('--columns', type=int, help='likewise')
-    add('--dx-mm', type=float, help='distance of columns; side of the squares')
-    add('--dy-mm', type=float, help='distance of rows (default: as --dx-mm, if that is given)')
-    add('--radius-mm', type=float, help='of the circles')
-    add('--marker-mm', type=float, help="side of a ChArUco board's markers")
-    add(
-        '--min-area-px',
-        type=float,
-        default=0.0,
-        help='smallest circle (default: 100 at 640x480, scaled with the picture)',
-    )
-    add('--max-area-px', type=float, default=0.0, help='largest circle (default: likewise 10000)')
-    add('--name', default='camera', help='camera_name in the file (default: %(default)s)')
-    add('-o', '--output', type=Path, help='camera_info file to write (default: NAME.yaml)')
-    add('--plot', type=Path, help='also draw the report, .png, .pdf or .svg')
-    return parser
-
-
-def _target(options: argparse.Namespace) -> Target:
-    names = ('rows', 'columns', 'dx_mm', 'dy_mm', 'radius_mm', 'marker_mm')
-    given = {name: value for name in names if (value := getattr(options, name)) is not None}
-    if 'dx_mm' in given:
-        given.setdefault('dy_mm', given['dx_mm'])
-    return replace(STANDARD[options.target], **given)
-
-
 def _run(options: argparse.Namespace) -> int:
     if not options.name or '/' in options.name:
         raise SettingError(f"--name is '{options.name}'; expected a word without '/'")
-    target = _target(options)
-    if options.print:
-        from fisheye_undistort.target_sheet import write_sheet
-
-        print(f'{options.print}: {target}, on {write_sheet(options.print, target)}')
-        return GOOD
+    if not 0 <= options.seam_deg < 180:
+        raise SettingError(f'--seam-deg is {options.seam_deg:g}; expected 0 to 180 degrees')
     if options.plot:
-        from fisheye_undistort.report_plot import check_plot, plot_report
+        from fisheye_undistort.report_plot import check_plot
 
         check_plot(options.plot)
-    collector = Collector(Detector(target, options.min_area_px, options.max_area_px))
-    if options.topic:
-        try:
-            from fisheye_undistort.collect_node import collect
-        except ImportError as error:
-            raise SettingError(f'--topic needs ROS 2: {error}') from error
-        collect(options.topic, collector, options.views, options.half)
-    elif options.pictures:
-        for picture in read_pictures(options.pictures, options.half):
-            collector.add(picture)
-    else:
-        raise SettingError('nothing to do: give pictures, --topic or --print (see --help)')
-    calibration = calibrate(collector.finish(), target, collector.size)
-    report = CalibrationReport(calibration, collector.brightest, collector.skipped)
-    output = options.output or Path(f'{options.name}.yaml')
-    write_camera(output, Camera(options.name, calibration.lens))
-    print(f'{report}\nwritten  {output}')
+    for name, action in _ACTIONS.items():
+        if getattr(options, name):
+            return action(options)
+    raise SettingError('nothing to do: give pictures, --topic or --print (see --help)')
+
+
+def _print(options: argparse.Namespace) -> int:
+    from fisheye_undistort.target_sheet import write_sheet
+
+    target = target_of(options)
+    print(f'{options.print}: {target}, on {write_sheet(options.print, target)}')
+    return GOOD
+
+
+def _compare(options: argparse.Namespace) -> int:
+    one, other = (read_camera(path).lens for path in options.compare)
+    difference = LensDifference(one, other)
+    print(difference)
     if options.plot:
+        from fisheye_undistort.difference_plot import plot_difference
+
+        plot_difference(options.plot, difference)
+    return GOOD
+
+
+def _convert(options: argparse.Namespace) -> int:
+    conversion = convert(options.convert)
+    output = options.output or Path(f'{options.name}.yaml')
+    write_as(options.to, output, Camera(options.name, conversion.lens), str(conversion))
+    print(f'{conversion}\nwritten  {output}')
+    return GOOD if conversion.good else POOR
+
+
+def _collected(options: argparse.Namespace) -> Gathered:
+    """Collect from a topic what is shown until there is enough."""
+    target = target_of(options)
+    detector = Detector(target, options.min_area_px, options.max_area_px, quick=True)
+    try:
+        from fisheye_undistort.collect_node import collect
+    except ImportError as error:
+        raise SettingError(f'--topic needs ROS 2: {error}') from error
+    collector = Collector(detector)
+    collect(options.topic, collector, options.views, options.half)
+    return Gathered(collector, target)
+
+
+def _gathered(options: argparse.Namespace) -> Gathered:
+    """Collect from pictures what they show."""
+    detector = Detector(target_of(options), options.min_area_px, options.max_area_px)
+    shown = sys.stderr.isatty()
+
+    def progress(line: str) -> None:
+        if shown:
+            print(f'\r{line:60.60}', end='', file=sys.stderr, flush=True)
+
+    try:
+        return gather(lambda: read_pictures(options.pictures, options.half), detector, progress)
+    finally:
+        if shown:
+            print(file=sys.stderr)
+
+
+def _calibrate(options: argparse.Namespace) -> int:
+    gathered = _collected(options) if options.topic else _gathered(options)
+    collector = gathered.collector
+    calibration = calibrate(
+        collector.finish(),
+        gathered.target,
+        collector.size,
+        lit=lit_part(collector.brightest),
+    )
+    report = CalibrationReport(
+        calibration, collector.brightest, collector.skipped, options.seam_deg
+    )
+    output = options.output or Path(f'{options.name}.yaml')
+    write_as(options.to, output, Camera(options.name, calibration.lens), calibrated_line(report))
+    write_report(report_path(output), report, options.name)
+    if gathered.note:
+        print(f'note     {gathered.note}')
+    print(f'{report}\nwritten  {output}, {report_path(output).name}')
+    if options.plot:
+        from fisheye_undistort.report_plot import plot_report
+
         plot_report(options.plot, report, collector.example)
     return GOOD if report.good else POOR
+
+
+_ACTIONS = {
+    'print': _print,
+    'compare': _compare,
+    'convert': _convert,
+    'topic': _calibrate,
+    'pictures': _calibrate,
+}
+"""What each option that names something to do does; the first that is given counts."""
 
 
 if __name__ == '__main__':

@@ -1,21 +1,26 @@
 """Calibrate a lens from views of a flat target."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import compress
 
 import numpy as np
 
 from fisheye_core.errors import CalibrationError
 from fisheye_geometry.lens import FisheyeLens
+from fisheye_undistort.angle_map import AngleMap
+from fisheye_undistort.cross_validation import Halves, cross_validate
 from fisheye_undistort.estimate import Estimate, TargetView, rms
 from fisheye_undistort.model_fitter import ModelFitter
+from fisheye_undistort.outliers import outlying_views, without_outlying_points
 from fisheye_undistort.sheet_model import UNKNOWNS, lens_of, to_camera, warp_board
 from fisheye_undistort.target import Target
+from fisheye_undistort.turned_views import turn_back
 
-_OUTLIER_RATIO = 4.0
-"""A view whose rms is this many times the median does not show what the others show."""
-_OUTLIER_WIDTHS = 1 / 1000
-"""Nor is any view dropped whose rms is below this share of the picture's width."""
+_MAX_FOCAL_DEVIATION = 0.2
+"""Share of the focal length; more uncertain than that, nothing is known of the lens."""
+_MAX_FOCAL_WIDTHS = 5.0
+"""Longer than that it is where the sheet shows neither perspective nor distortion."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +39,12 @@ class Calibration:
         Name of each view that was not used, and why.
     target
         What was printed.
+    outlying
+        Points of used views that were left out, each with its view and how far it is off.
+    turned
+        Names of the views whose pictures were turned by 180 degrees.
+    halves
+        What the even and the odd views say apart; None of too few.
     """
 
     lens: FisheyeLens
@@ -41,6 +52,9 @@ class Calibration:
     views: tuple[TargetView, ...]
     dropped: dict[str, str]
     target: Target
+    outlying: tuple[str, ...] = ()
+    turned: tuple[str, ...] = ()
+    halves: Halves | None = None
 
     @property
     def rms_px(self) -> float:
@@ -48,9 +62,20 @@ class Calibration:
         return rms(np.concatenate(self.estimate.residuals_px))
 
     @property
+    def covariance(self) -> np.ndarray:
+        """Covariance (11, 11) of `UNKNOWNS`, enlarged until both halves agree."""
+        excess = self.halves.excess if self.halves else 1.0
+        return excess**2 * self.estimate.covariance
+
+    @property
     def deviations(self) -> dict[str, float]:
-        """Standard deviation of each of `UNKNOWNS`; 0 for what was not fitted."""
-        return dict(zip(UNKNOWNS, np.sqrt(np.diag(self.estimate.covariance)), strict=True))
+        """Standard deviation of each of `UNKNOWNS`."""
+        return dict(zip(UNKNOWNS, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
+
+    @cached_property
+    def angles(self) -> AngleMap:
+        """Rays of the lens over its picture."""
+        return AngleMap.of(self.lens, self.estimate.unknowns)
 
     @property
     def directions_rad(self) -> tuple[np.ndarray, np.ndarray]:
@@ -66,7 +91,12 @@ class Calibration:
 
 
 def calibrate(
-    views: list[TargetView], target: Target, size: tuple[int, int], *, correct_bias: bool = True
+    views: list[TargetView],
+    target: Target,
+    size: tuple[int, int],
+    *,
+    lit: np.ndarray | None = None,
+    correct_bias: bool = True,
 ) -> Calibration:
     """Fit a Kannala-Brandt lens to views of a target.
 
@@ -78,6 +108,9 @@ def calibrate(
         What was printed.
     size
         Width and height of the pictures, px.
+    lit
+        (30, 40) bool of `angle_map.lit_part`: where both halves of the views must agree; None:
+        everywhere.
     correct_bias
         Whether to account for a circle's centre of mass not being where its centre is seen.
 
@@ -90,36 +123,55 @@ def calibrate(
         raise CalibrationError('there is no view of the target to calibrate from')
     try:
         with np.errstate(divide='raise', invalid='raise'):
-            fitter, estimate, dropped = _fit_without_outliers(views, target, size, correct_bias)
-        lens = lens_of(estimate.unknowns, size)
+            return _calibrate(ModelFitter(views, target, size, correct_bias=correct_bias), lit)
     except (FloatingPointError, np.linalg.LinAlgError, CalibrationError) as error:
         raise CalibrationError(
             f'no lens fits what was seen of the target ({error}); tilt it, and bring it nearer '
             'and to the edges of the picture'
         ) from error
-    return Calibration(lens, estimate, tuple(fitter.views), dropped, target)
 
 
-def _fit_without_outliers(
-    views: list[TargetView], target: Target, size: tuple[int, int], correct_bias: bool
+def _calibrate(fitter: ModelFitter, lit: np.ndarray | None) -> Calibration:
+    fitter, rough, turned = turn_back(fitter, fitter.rough())
+    fitter, rough, dropped = _without_outlying_views(fitter, rough)
+    estimate = fitter.fine(rough)
+    views, outlying = without_outlying_points(
+        fitter.views, estimate, fitter.target, fitter.size[0]
+    )
+    if outlying:
+        fitter = fitter.of(views)
+        estimate = fitter.fine(estimate)
+    focal_px, deviation_px = estimate.unknowns[0], float(np.sqrt(estimate.covariance[0, 0]))
+    longest_px = _MAX_FOCAL_WIDTHS * fitter.size[0]
+    if deviation_px > _MAX_FOCAL_DEVIATION * focal_px or focal_px > longest_px:
+        raise CalibrationError(f'the focal length is {focal_px:.0f} +- {deviation_px:.0f} px')
+    lens = lens_of(estimate.unknowns, fitter.size)
+    everywhere = np.ones(AngleMap.of(lens, estimate.unknowns).seen.shape, bool)
+    halves = cross_validate(fitter, estimate, everywhere if lit is None else lit)
+    return Calibration(
+        lens,
+        estimate,
+        tuple(fitter.views),
+        dropped,
+        fitter.target,
+        tuple(outlying),
+        tuple(turned),
+        halves,
+    )
+
+
+def _without_outlying_views(
+    fitter: ModelFitter, rough: Estimate
 ) -> tuple[ModelFitter, Estimate, dict[str, str]]:
-    """Fit, leave out the views that do not fit, and fit again until all do."""
-    fitter = ModelFitter(views, target, size, correct_bias)
+    """Leave out the views that do not fit, and fit again until all do."""
     dropped: dict[str, str] = {}
-    while True:
-        sequence = fitter.fit_sequence()
-        outliers = _outlying_views(sequence[-1], size)
-        if not outliers.any():
-            return fitter, fitter.choose(sequence), dropped
-        rms = sequence[-1].rms_px[outliers]
+    while (outliers := outlying_views(rough, fitter.size[0])).any():
         dropped |= {
-            view.name: f'does not fit: rms {miss:.2f} px'
-            for view, miss in zip(compress(fitter.views, outliers), rms, strict=True)
+            view.name: f'does not fit: rms {off:.2f} px'
+            for view, off in zip(
+                compress(fitter.views, outliers), rough.rms_px[outliers], strict=True
+            )
         }
-        fitter = ModelFitter([*compress(fitter.views, ~outliers)], target, size, correct_bias)
-
-
-def _outlying_views(estimate: Estimate, size: tuple[int, int]) -> np.ndarray:
-    """Mark the views (V,) that the lens does not explain as it explains the others."""
-    rms = estimate.rms_px
-    return rms > max(_OUTLIER_RATIO * np.median(rms), _OUTLIER_WIDTHS * size[0])
+        fitter = fitter.part(np.flatnonzero(~outliers))
+        rough = fitter.rough()
+    return fitter, rough, dropped

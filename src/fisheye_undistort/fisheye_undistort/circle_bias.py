@@ -3,7 +3,7 @@
 import numpy as np
 
 from fisheye_undistort.estimate import Estimate, TargetView
-from fisheye_undistort.sheet_model import project, to_camera, warp_board
+from fisheye_undistort.sheet_model import pixels_of, to_camera, warp_board
 from fisheye_undistort.target import Target
 
 _RIM = np.linspace(0, 2 * np.pi, 32, endpoint=False)
@@ -21,8 +21,8 @@ def center_bias(estimate: Estimate, views: list[TargetView], target: Target) -> 
     for pose, view in zip(estimate.poses, views, strict=True):
         centers = warp_board(target.points_mm, estimate.board_warp_mm)[view.ids]
         rims = to_camera(pose, centers[:, None] + rim)
-        outline = project(estimate.unknowns, rims.reshape(-1, 3))[0].reshape(*rims.shape[:2], 2)
-        middle = project(estimate.unknowns, to_camera(pose, centers))[0]
+        outline = pixels_of(estimate.unknowns, rims)
+        middle = pixels_of(estimate.unknowns, to_camera(pose, centers))
         biases.append(_centroid(outline - middle[:, None]))
     return biases
 

@@ -11,6 +11,10 @@ MIN_AREA_PX = 100.0
 MAX_AREA_PX = 10_000.0
 """Areas of the particles that are kept in a picture of `_AREA_PICTURE_PX` pixels."""
 _AREA_PICTURE_PX = 640 * 480
+_BANDS = (1.0, 0.16, 4.0)
+"""Shares of these areas that are tried."""
+_LEAST_AREA_PX = 12.0
+"""Smaller particles have no shape."""
 
 _DARK_SHARE = 0.85
 """Darker than this share of the mean around it is dark: a shadow darkens both."""
@@ -54,18 +58,27 @@ class Circles:
 _NONE = Circles(np.empty((0, 2)), np.empty((0, 2, 2)))
 
 
-def area_limits(
+def area_bands(
     shape: tuple[int, ...], min_area_px: float = 0.0, max_area_px: float = 0.0
-) -> tuple[float, float]:
-    """Limits of the particle filter for a picture's shape; 0: the default, scaled with it."""
+) -> list[tuple[float, float]]:
+    """Limits of the particle filter to try, one after another, for a picture's shape.
+
+    A limit that is given is kept. Without one, circles of the usual size are looked for, then
+    smaller ones, then larger ones.
+    """
     scale = shape[0] * shape[1] / _AREA_PICTURE_PX
-    low, high = min_area_px or MIN_AREA_PX * scale, max_area_px or MAX_AREA_PX * scale
-    if not 0 < low < high:
+    bands: list[tuple[float, float]] = []
+    for share in (1.0,) if min_area_px and max_area_px else _BANDS:
+        low = min_area_px or max(MIN_AREA_PX * scale * share, _LEAST_AREA_PX)
+        high = max_area_px or MAX_AREA_PX * scale * share
+        if low < high and (low, high) not in bands:
+            bands.append((low, high))
+    if not bands or bands[0][0] <= 0:
         raise SettingError(
-            f'particles of {low:g} to {high:g} px are to be kept; '
+            f'particles of {min_area_px:g} to {max_area_px:g} px are to be kept; '
             'expected min_area_px below max_area_px, both above 0'
         )
-    return low, high
+    return bands
 
 
 def find_circles(gray: np.ndarray, min_area_px: float = 0.0, max_area_px: float = 0.0) -> Circles:
@@ -88,7 +101,7 @@ def find_circles(gray: np.ndarray, min_area_px: float = 0.0, max_area_px: float 
     """
     if gray.ndim != 2 or gray.dtype != np.uint8:
         raise ImageFormatError(f'the picture is {gray.dtype}{gray.shape}; expected uint8 (h, w)')
-    low, high = area_limits(gray.shape, min_area_px, max_area_px)
+    low, high = area_bands(gray.shape, min_area_px, max_area_px)[0]
     largest = 2 * np.sqrt(high / np.pi)
     found = [
         particle

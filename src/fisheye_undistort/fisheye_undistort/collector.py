@@ -1,16 +1,23 @@
 """Collect views of a target that tell something new about the lens."""
 
+from collections import Counter
+
 import numpy as np
 
 from fisheye_core.errors import CalibrationError, ImageFormatError
+from fisheye_undistort.angle_map import lit_part, picture_grid, place_name
 from fisheye_undistort.detection import Detector
 from fisheye_undistort.estimate import TargetView
+from fisheye_undistort.looking import Found, look_at
 from fisheye_undistort.pictures import NamedPicture
 
 _MOVED = 0.01
 """A view is new where the target lies this share of the picture's width from all before."""
 _STILL = 0.005
 """Between two looks at a moving target it must not move more, or it is blurred and sheared."""
+_COVERED = 0.12
+"""A place is covered where a point of the target lies within this share of the width."""
+_MOST_PLACES = 2
 _CELLS = (8, 6)
 """Columns and rows into which the picture is divided to tell how much of it was covered."""
 
@@ -26,6 +33,8 @@ class Collector:
         Why the last picture was not used, '' if it was.
     skipped : dict
         Name of each picture that was not used, and why; those of a moving target are not listed.
+    looks : int
+        Pictures that were added.
     size : tuple
         Width and height of the pictures, px.
     brightest : ndarray
@@ -38,7 +47,7 @@ class Collector:
         self._detector = detector
         self._places: list[np.ndarray] = []
         self._last: np.ndarray | None = None
-        self._looks = self._found = 0
+        self._found = self.looks = 0
         self._largest = 0.0
         self.views: list[TargetView] = []
         self.state = ''
@@ -46,8 +55,8 @@ class Collector:
         self.size = (0, 0)
         self.brightest = self.example = np.zeros((0, 0), np.uint8)
 
-    def add(self, picture: NamedPicture) -> bool:
-        """Look at a picture; tell whether its view was kept.
+    def add(self, picture: NamedPicture, found: Found | None = None) -> bool:
+        """Look at a picture, unless it is known what was found; tell whether its view was kept.
 
         Raises
         ------
@@ -56,19 +65,22 @@ class Collector:
         """
         self._check_size(picture)
         self.brightest = np.maximum(self.brightest, picture.gray)
-        self._looks += 1
-        self.state = self._look(picture)
+        self.looks += 1
+        self.state = self._judge(picture, found or look_at(picture, self._detector))
         if self.state and not picture.moving:
             self.skipped[picture.name] = self.state
         return not self.state
 
-    def _look(self, picture) -> str:
+    @property
+    def found_any(self) -> bool:
+        """Whether any picture showed the target, even if its view was not kept."""
+        return self._found > 0
+
+    def _judge(self, picture: NamedPicture, view: Found) -> str:
         """Keep a picture's view, or say why not."""
         before, self._last = self._last, None
-        try:
-            view = self._detector(picture.name, picture.gray)
-        except CalibrationError as error:
-            return str(error)
+        if isinstance(view, str):
+            return view
         self._found += 1
         place = self._last = _place(view)
         if picture.moving and not _close(place, before, _STILL * self.size[0]):
@@ -106,11 +118,11 @@ class Collector:
             If there are none, or many pictures of one and the same.
         """
         if not self._found:
-            last = f'; the last: {self.state}' if self._looks else ''
-            raise CalibrationError(f'the target is in none of {self._looks} pictures{last}')
+            last = f'; the last: {self.state}' if self.looks else ''
+            raise CalibrationError(f'the target is in none of {self.looks} pictures{last}')
         if not self.views:
             raise CalibrationError(
-                f'the target moves in all {self._looks} pictures; hold it still for half a second'
+                f'the target moves in all {self.looks} pictures; hold it still for half a second'
             )
         if len(self.views) == 1 and self._found > 1:
             raise CalibrationError(
@@ -127,11 +139,19 @@ class Collector:
         size = np.array(self.size)
         cells = (points / size * _CELLS).astype(int).clip(0, np.array(_CELLS) - 1)
         share = len(np.unique(cells, axis=0)) / np.prod(_CELLS)
-        reach = np.abs(points / size - 0.5).max(axis=0) * 2
         return (
-            f'{len(self.views)} views, {share:.0%} of the picture covered, '
-            f'{reach[0]:.0%} of the way to the sides, {reach[1]:.0%} up and down'
+            f'{len(self.views)} views, {share:.0%} of the picture covered{self._missing(points)}'
         )
+
+    def _missing(self, points: np.ndarray) -> str:
+        """Name the places where the target should be shown next."""
+        grid = picture_grid(self.size)[lit_part(self.brightest)]
+        apart = np.linalg.norm(grid[:, None] - points, axis=-1).min(axis=1)
+        far = grid[apart > _COVERED * self.size[0]]
+        places = Counter(place_name(x, y, self.size[::-1]) for x, y in far).most_common(
+            _MOST_PLACES
+        )
+        return f'; show it at the {" and the ".join(name for name, _ in places)}' if places else ''
 
 
 def _place(view: TargetView) -> np.ndarray:

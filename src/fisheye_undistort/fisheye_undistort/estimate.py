@@ -59,6 +59,13 @@ class Estimate:
         return self.unknowns[len(INTRINSICS) :]
 
     @property
+    def noise_px(self) -> float:
+        """Standard deviation of a coordinate of a point, from the robust cost."""
+        equations = 2 * sum(map(len, self.residuals_px))
+        unknowns = self.poses.size + np.count_nonzero(np.diag(self.covariance))
+        return float(np.sqrt(self.cost / max(equations - unknowns, 1)))
+
+    @property
     def rms_px(self) -> np.ndarray:
         """Root mean square distance of each view's points, (V,) px."""
         return np.array([rms(residuals) for residuals in self.residuals_px])

@@ -5,10 +5,12 @@ import numpy as np
 
 from fisheye_geometry.lens import FisheyeLens
 from fisheye_undistort.estimate import Estimate, TargetView
-from fisheye_undistort.sheet_model import UNKNOWNS, lens_of, project, to_camera
+from fisheye_undistort.sheet_model import UNKNOWNS, lens_of, pixels_of, to_camera
 
 _FOCAL_SCAN = np.geomspace(0.4, 4.0, 15)
 """Starts tried, in shares of width / pi: from a circle in the middle to a narrow lens."""
+_ENOUGH_VIEWS = 30
+"""More do not tell a good start better."""
 
 
 def first_guess(views: list[TargetView], points_mm: np.ndarray, size: tuple[int, int]) -> Estimate:
@@ -25,19 +27,26 @@ def first_guess(views: list[TargetView], points_mm: np.ndarray, size: tuple[int,
     """
     width, height = size
     candidates = []
+    some = views[:: -(-len(views) // _ENOUGH_VIEWS)]
     for focal in _FOCAL_SCAN * width / np.pi:
         unknowns = np.zeros(len(UNKNOWNS))
         unknowns[:4] = focal, focal, (width - 1) / 2, (height - 1) / 2
-        poses = np.array([_pose(view, points_mm, lens_of(unknowns, size)) for view in views])
         residuals = [
             np.linalg.norm(
-                project(unknowns, to_camera(pose, points_mm[view.ids]))[0] - view.points_px,
+                pixels_of(unknowns, to_camera(pose, points_mm[view.ids])) - view.points_px,
                 axis=-1,
             ).mean()
-            for pose, view in zip(poses, views, strict=True)
+            for pose, view in zip(_poses(some, points_mm, unknowns, size), some, strict=True)
         ]
-        candidates.append((float(np.median(residuals)), focal, Estimate(unknowns, poses)))
-    return min(candidates, key=lambda candidate: candidate[0])[2]
+        candidates.append((float(np.median(residuals)), focal, unknowns))
+    _, _, best = min(candidates)
+    return Estimate(best, _poses(views, points_mm, best, size))
+
+
+def _poses(views, points_mm, unknowns, size) -> np.ndarray:
+    """Pose (V, 6) of each view before one lens."""
+    lens = lens_of(unknowns, size)
+    return np.array([_pose(view, points_mm, lens) for view in views])
 
 
 def _pose(view: TargetView, points_mm: np.ndarray, lens: FisheyeLens) -> np.ndarray:

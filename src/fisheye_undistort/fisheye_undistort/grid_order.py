@@ -18,6 +18,20 @@ _SEEDS = 3
 """How often a circle is reached before it is no start any more: a start may be a stray."""
 
 
+class GridNotFoundError(CalibrationError):
+    """No grid of circles as the target has it.
+
+    Attributes
+    ----------
+    circles : int
+        How many the largest grid holds that there is.
+    """
+
+    def __init__(self, reason: str, circles: int):
+        super().__init__(reason)
+        self.circles = circles
+
+
 def order_grid(circles: Circles, target: Target) -> tuple[np.ndarray, np.ndarray]:
     """Find the grid among circles and tell which point of the target each circle is.
 
@@ -34,7 +48,7 @@ def order_grid(circles: Circles, target: Target) -> tuple[np.ndarray, np.ndarray
 
     Raises
     ------
-    CalibrationError
+    GridNotFoundError
         If there is no such grid.
     """
     neighbourhood = _Neighbourhood(circles, target)
@@ -52,7 +66,7 @@ def order_grid(circles: Circles, target: Target) -> tuple[np.ndarray, np.ndarray
                 best = rank, matched
         visits[list({circle for cells, _ in grown for circle in cells})] += 1
     if best is None:
-        raise CalibrationError(_what_is_there(circles, largest, target))
+        raise GridNotFoundError(_what_is_there(circles, largest, target), len(largest))
     ids = np.array(sorted(best[1]))
     return circles.centers[[best[1][i] for i in ids]], ids
 
@@ -188,4 +202,7 @@ def _what_is_there(circles: Circles, cells: dict[int, tuple], target: Target) ->
     columns, rows = (np.ptp(line) + 1 for line in lines)
     if target.kind == 'acircles':
         columns //= 2
+    if (rows, columns) == (target.rows, target.columns):
+        whole = len(target.cells)
+        return f'only {len(cells)} of the {whole} circles of the grid; the sheet is cut off'
     return f'a grid of circles, {rows} x {columns} (rows x columns), found; {wanted}'

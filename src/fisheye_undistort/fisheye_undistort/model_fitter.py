@@ -1,90 +1,92 @@
-"""Lens models from poor to rich, and which of them the views of a target bear out."""
-
-from math import inf
+"""From a first guess to the lens that explains the views of a target best."""
 
 import numpy as np
 
 from fisheye_undistort.circle_bias import center_bias
-from fisheye_undistort.estimate import Estimate
+from fisheye_undistort.estimate import Estimate, TargetView
 from fisheye_undistort.first_guess import first_guess
 from fisheye_undistort.lens_fit import GROUPS, fit
+from fisheye_undistort.lens_prior import usual_lens
+from fisheye_undistort.target import Target
 
-_ORDER = (
-    'focal length',
-    'k1',
-    'principal point',
-    'k2',
-    'aspect ratio',
-    'k3',
-    'k4',
-    'board warp',
+_STAGES = (
+    ('focal length',),
+    ('focal length', 'k1', 'principal point'),
+    ('focal length', 'k1', 'principal point', 'k2', 'aspect ratio'),
+    tuple(GROUPS),
 )
-MODELS = tuple(_ORDER[:count] for count in range(1, len(_ORDER) + 1))
 """What is fitted, from what every picture tells to what only many can."""
 
-_EQUATIONS_PER_UNKNOWN = 3
-"""Equations left after the poses, for each free unknown: nine points hold four of them."""
 _ROUGH = 1e-3
 """Relative change of the cost at which a fit is good enough to start the next from."""
+_FINE = 1e-8
 _BIAS_ROUNDS = 6
 _BIAS_SETTLED_PX = 0.002
-_LEAST_COST_PX2 = 1e-8
+_NOISE_ROUNDS = 2
+_LEAST_NOISE_PX = 1e-6
+_FIRST_NOISE_PX = 0.5
 
 
 class ModelFitter:
-    """Fits ever richer models to the same views."""
+    """Fits a lens to views, first roughly, then to the last digit.
 
-    def __init__(self, views, target, size, correct_bias):
-        self.views = views
-        self._target = target
+    Attributes
+    ----------
+    views : list of TargetView
+        What it explains.
+    target : Target
+        What was printed.
+    size : tuple
+        Width and height of the pictures, px.
+    """
+
+    def __init__(
+        self,
+        views: list[TargetView],
+        target: Target,
+        size: tuple[int, int],
+        *,
+        correct_bias: bool = True,
+    ):
+        self.views, self.target, self.size = views, target, size
         self._correct_bias = correct_bias and target.has_circles
-        self._start = first_guess(views, target.points_mm, size)
-        self._equations = 2 * sum(len(view.ids) for view in views)
-        affordable = (self._equations - 6 * len(views)) / _EQUATIONS_PER_UNKNOWN
-        self._models = [free for free in MODELS if _unknowns(free) <= affordable] or MODELS[:1]
 
-    def _fit(self, estimate: Estimate, free, bias, **how) -> Estimate:
-        return fit(
-            self.views, self._target.points_mm, estimate, self._start.unknowns, free, bias, **how
-        )
+    def part(self, some: np.ndarray) -> 'ModelFitter':
+        """Return a fitter of the views with these indices."""
+        return self.of([self.views[i] for i in some])
 
-    def fit_sequence(self) -> list[Estimate]:
-        """Fit each model roughly, the next from where the last one ended."""
-        sequence = [self._start]
-        for free in self._models:
-            sequence.append(self._fit(sequence[-1], free, None, tolerance=_ROUGH))
-        return sequence[1:]
+    def of(self, views: list[TargetView]) -> 'ModelFitter':
+        """Return a fitter of other views of the same target."""
+        return ModelFitter(views, self.target, self.size, correct_bias=self._correct_bias)
 
-    def choose(self, sequence: list[Estimate]) -> Estimate:
-        """Fit the richest model, then poorer ones for as long as they explain the data better.
+    def rough(self) -> Estimate:
+        """Fit ever more, each stage from where the last one ended."""
+        estimate = first_guess(self.views, self.target.points_mm, self.size)
+        for free in _STAGES:
+            estimate = self._fit(estimate, free, _FIRST_NOISE_PX, None, _ROUGH)
+        return estimate
 
-        The Bayesian information criterion asks of each intrinsic that it lowers the cost by more
-        than chance would (Schwarz 1978, doi 10.1214/aos/1176344136).
-        """
-        best, lowest, bias = sequence[-1], inf, None
-        for start in reversed(sequence):
-            estimate, bias = self._without_bias(start, bias)
-            variance = max(estimate.cost, _LEAST_COST_PX2) / self._equations
-            criterion = self._equations * np.log(variance)
-            criterion += _unknowns(estimate.free) * np.log(self._equations)
-            if criterion > lowest:
-                break
-            best, lowest = estimate, criterion
-        return best
-
-    def _without_bias(self, start: Estimate, bias) -> tuple[Estimate, list | None]:
-        """Fit, predict by how much the circles' centres of mass are off, and fit again."""
-        estimate = self._fit(start, start.free, bias)
+    def fine(self, start: Estimate) -> Estimate:
+        """Fit all, predict by how much the circles' centres of mass are off, and fit again."""
+        estimate, bias = start, self.bias(start, self.views)
+        for _ in range(_NOISE_ROUNDS):
+            estimate = self._fit(estimate, _STAGES[-1], estimate.noise_px, bias, _FINE)
         for _ in range(_BIAS_ROUNDS if self._correct_bias else 0):
-            before, bias = bias, center_bias(estimate, self.views, self._target)
-            if before and _change(before, bias) < _BIAS_SETTLED_PX:
+            before, bias = bias, self.bias(estimate, self.views)
+            if _change(before, bias) < _BIAS_SETTLED_PX:
                 break
-            estimate = self._fit(estimate, start.free, bias)
-        return estimate, bias
+            estimate = self._fit(estimate, _STAGES[-1], estimate.noise_px, bias, _FINE)
+        return estimate
 
+    def bias(self, estimate: Estimate, views: list[TargetView]) -> list[np.ndarray] | None:
+        """Return what `center_bias` predicts for the circles of views; None for corners."""
+        return center_bias(estimate, views, self.target) if self._correct_bias else None
 
-def _unknowns(free: tuple[str, ...]) -> int:
-    return sum(len(GROUPS[name]) for name in free)
+    def _fit(self, start: Estimate, free, noise_px, bias, tolerance) -> Estimate:
+        points_mm = self.target.points_mm
+        noise_px = max(noise_px, _LEAST_NOISE_PX)
+        prior = usual_lens(start.unknowns, self.size, points_mm, noise_px)
+        return fit(self.views, points_mm, start, start.unknowns, free, bias, prior, tolerance)
 
 
 def _change(before, after) -> float:

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -16,6 +16,9 @@ HALVES = ('left', 'right')
 
 _VIDEOS = frozenset({'.mp4', '.avi', '.mkv', '.mov', '.webm', '.m4v', '.mjpg', '.mjpeg'})
 """What is taken from a folder or glob besides pictures."""
+_FOREIGN = frozenset({'.heic', '.heif', '.avif'})
+"""Pictures that telephones leave in a folder; most cannot be read, and that is said."""
+_TAKEN = SUFFIXES | _VIDEOS | _FOREIGN
 _LOOKS_PER_SECOND = 10
 """Frames of a video that are looked at; a hand does not hold a sheet still for less."""
 
@@ -32,11 +35,14 @@ class NamedPicture:
         (height, width) uint8.
     moving
         Whether it is one of a sequence, in which the target may be on its way.
+    problem
+        Why there are no pixels, '' if there are.
     """
 
     name: str
     gray: np.ndarray
     moving: bool = False
+    problem: str = ''
 
 
 def read_pictures(paths: Iterable[str | Path], half: str = '') -> Iterator[NamedPicture]:
@@ -52,12 +58,19 @@ def read_pictures(paths: Iterable[str | Path], half: str = '') -> Iterator[Named
     Raises
     ------
     SourceError
-        If there is nothing, or something that cannot be read; the sentence names it.
+        If there is nothing; what is there and cannot be read is a picture with a `problem`.
     """
     for path in _expand(paths):
-        pictures = [_picture(path)] if is_picture(path) else _frames(path)
-        for picture in pictures:
-            yield NamedPicture(picture.name, cut(picture.gray, half), picture.moving)
+        pictures = _picture(path) if _is_picture(path) else _frames(path)
+        try:
+            for picture in pictures:
+                yield replace(picture, gray=cut(picture.gray, half))
+        except SourceError as error:
+            yield NamedPicture(path.name, np.empty((0, 0), np.uint8), problem=str(error))
+
+
+def _is_picture(path: Path) -> bool:
+    return is_picture(path) or path.suffix.lower() in _FOREIGN
 
 
 def cut(gray: np.ndarray, half: str) -> np.ndarray:
@@ -70,15 +83,15 @@ def cut(gray: np.ndarray, half: str) -> np.ndarray:
 def _expand(paths: Iterable[str | Path]) -> list[Path]:
     found = []
     for path in paths:
-        inside = [Path(path)] if os.path.isfile(path) else pictures_in(path, SUFFIXES | _VIDEOS)
+        inside = [Path(path)] if os.path.isfile(path) else pictures_in(path, _TAKEN)
         if not inside:
             raise SourceError(f'{path} is not there, neither a file nor a folder nor a glob')
         found += inside
     return found
 
 
-def _picture(path: Path) -> NamedPicture:
-    return NamedPicture(path.name, read_picture(path, grey=True))
+def _picture(path: Path) -> Iterator[NamedPicture]:
+    yield NamedPicture(path.name, read_picture(path, grey=True))
 
 
 def _frames(path: Path) -> Iterator[NamedPicture]:

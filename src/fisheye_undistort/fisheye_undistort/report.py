@@ -7,25 +7,21 @@ import numpy as np
 
 from fisheye_geometry.image_circle import ImageCircle
 from fisheye_undistort.calibration import Calibration
-from fisheye_undistort.estimate import rms
+from fisheye_undistort.certainty import LIMIT_DEG, Certainty
 from fisheye_undistort.lens_fit import GROUPS
-from fisheye_undistort.sheet_model import INTRINSICS
-
-RING_DEG = 10
-"""Width of the rings in which the coverage is counted."""
-SECTORS = 8
+from fisheye_undistort.lens_prior import assumed_deviations
+from fisheye_undistort.misfit import RING_DEG, SECTORS, sector_of
+from fisheye_undistort.report_text import report_lines
+from fisheye_undistort.sheet_model import UNKNOWNS
 
 _MIN_VIEWS = 5
-_MIN_REACH = 0.7
-"""Share of the angle at the picture's edge up to which there must be points."""
-_HALF_WAY = 0.45
-_MIN_SECTORS = 6
-"""Of `SECTORS`, those that must have points beyond `_HALF_WAY` to the edge."""
 _MAX_RMS_WIDTHS = 1 / 1200
 """Scatter of the points, in widths of the picture: half a pixel at 640."""
-_MAX_FOCAL_DEVIATION = 0.005
-_MAX_CENTER_DEVIATION_WIDTHS = 0.005
-_BAR = 30
+_MAX_MISFIT_DEG = 0.1
+"""What the model may leave."""
+_ASSUMED = 0.7
+"""Share of what was known before, above which the points told nothing."""
+_MOST_GAPS = 3
 
 
 @dataclass(frozen=True)
@@ -40,11 +36,19 @@ class CalibrationReport:
         (height, width) uint8, the brightest that each pixel was: shows the image circle.
     skipped
         Name of each picture that gave no view, and why.
+    seam_deg
+        Angle from the axis up to which the lens must be known; 0: all that the picture shows.
     """
 
     calibration: Calibration
     brightest: np.ndarray
     skipped: dict[str, str]
+    seam_deg: float = 0.0
+
+    @cached_property
+    def certainty(self) -> Certainty:
+        """How well the lens is known over the picture."""
+        return Certainty(self.calibration, self.brightest, self.seam_deg)
 
     @cached_property
     def edge_rad(self) -> float:
@@ -61,7 +65,7 @@ class CalibrationReport:
         rings = int(np.ceil(np.degrees(max(self.edge_rad, angle.max())) / RING_DEG))
         ring = (np.degrees(angle) // RING_DEG).astype(int).clip(0, rings - 1)
         counts = np.zeros((rings, SECTORS), int)
-        np.add.at(counts, (ring, _sector(azimuth)), 1)
+        np.add.at(counts, (ring, sector_of(azimuth)), 1)
         return counts
 
     @cached_property
@@ -73,39 +77,40 @@ class CalibrationReport:
         views = len(self.calibration.views)
         if views < _MIN_VIEWS:
             yield f'only {views} view{"s" * (views > 1)} (expected {_MIN_VIEWS} and more)'
-        angle, azimuth = self.calibration.directions_rad
-        reach, edge = np.degrees([angle.max(), self.edge_rad])
-        if reach < _MIN_REACH * edge:
-            yield f'no points beyond {reach:.0f} degrees, and the picture shows {edge:.0f}'
-        outer = azimuth[angle > _HALF_WAY * self.edge_rad]
-        sectors = len(np.unique(_sector(outer)))
-        if sectors < _MIN_SECTORS:
-            yield (
-                f'points beyond {_HALF_WAY * edge:.0f} degrees in only {sectors} of '
-                f'{SECTORS} directions'
-            )
+        yield from map(str, self.certainty.gaps[:_MOST_GAPS])
 
     def _doubts_of_fit(self):
-        calibration = self.calibration
-        lens, deviations = calibration.lens, calibration.deviations
-        if calibration.rms_px > _MAX_RMS_WIDTHS * lens.width:
+        calibration, misfit = self.calibration, self.certainty.misfit
+        width = calibration.lens.width
+        if calibration.rms_px > _MAX_RMS_WIDTHS * width:
             yield (
                 f'the points scatter by {calibration.rms_px:.2f} px (expected at most '
-                f'{_MAX_RMS_WIDTHS * lens.width:.1f})'
+                f'{_MAX_RMS_WIDTHS * width:.1f})'
             )
-        focal = deviations['focal_x_px'] / lens.focal_x_px
-        if focal > _MAX_FOCAL_DEVIATION:
-            yield f'the focal length is uncertain by {focal:.1%}'
-        center = max(deviations['center_x_px'], deviations['center_y_px'])
-        if center > _MAX_CENTER_DEVIATION_WIDTHS * lens.width:
-            yield f'the principal point is uncertain by {center:.1f} px'
-        if len(calibration.views) < _MIN_VIEWS and self._assumed:
-            yield f'{", ".join(self._assumed)} could only be assumed'
+        off_deg = np.degrees(misfit.typical_rad)
+        if off_deg > _MAX_MISFIT_DEG:
+            yield (
+                f'the model of Kannala and Brandt leaves {misfit.typical_px:.2f} px '
+                f'({off_deg:.2f} degrees) that all views share'
+            )
+        if len(calibration.views) < _MIN_VIEWS and self.assumed:
+            yield f'{", ".join(self.assumed)} could only be assumed'
 
-    @property
-    def _assumed(self) -> list[str]:
-        """Groups of unknowns that were not fitted."""
-        return [name for name in GROUPS if name not in self.calibration.estimate.free]
+    @cached_property
+    def assumed(self) -> list[str]:
+        """Groups of unknowns of which the points told nothing that was not known before."""
+        calibration = self.calibration
+        size = (calibration.lens.width, calibration.lens.height)
+        before = assumed_deviations(
+            calibration.estimate.unknowns, size, calibration.target.points_mm
+        )
+        now = np.array([*calibration.deviations.values()])
+        told = dict(zip(UNKNOWNS, now < _ASSUMED * before, strict=True))
+        return [
+            name
+            for name, directions in GROUPS.items()
+            if not any(told[UNKNOWNS[i]] for i in np.flatnonzero(np.any(directions, axis=0)))
+        ]
 
     @property
     def good(self) -> bool:
@@ -116,57 +121,12 @@ class CalibrationReport:
     def verdict(self) -> str:
         """One sentence."""
         if self.good:
-            reach = np.degrees(self.calibration.directions_rad[0].max())
             return (
-                f'good: {len(self.calibration.views)} views out to {reach:.0f} degrees fit '
-                f'to {self.calibration.rms_px:.2f} px'
+                f'good: {len(self.calibration.views)} views fit to '
+                f'{self.calibration.rms_px:.2f} px, and the lens is known to {LIMIT_DEG:g} '
+                f'degrees out to {self.certainty.calibrated_deg:.0f} degrees from its axis'
             )
         return f'poor: {"; ".join(self.doubts)}'
 
     def __str__(self):
-        return '\n'.join(
-            [
-                *self._views(),
-                *self._lens(),
-                *self._covered(),
-                f'verdict  {self.verdict}',
-            ]
-        )
-
-    def _views(self):
-        calibration = self.calibration
-        yield f'target   {calibration.target}'
-        yield f'views    {len(calibration.views)} used, rms {calibration.rms_px:.3f} px in all'
-        for view, residuals in zip(
-            calibration.views, calibration.estimate.residuals_px, strict=True
-        ):
-            yield f'  {view.name:30} {len(view.ids):4} points  rms {rms(residuals):.3f} px'
-        for name, reason in {**self.skipped, **calibration.dropped}.items():
-            yield f'  {name:30} not used: {reason}'
-
-    def _lens(self):
-        calibration = self.calibration
-        unknowns, deviations = calibration.estimate.unknowns, calibration.deviations
-        yield f'lens     Kannala-Brandt, {calibration.lens.width} x {calibration.lens.height} px'
-        yield f'fitted   {", ".join(calibration.estimate.free)}'
-        if self._assumed:
-            yield f'assumed  {", ".join(self._assumed)}: the points do not ask for more'
-        for (name, deviation), value in zip(deviations.items(), unknowns, strict=True):
-            digits = 3 if name not in INTRINSICS or name.endswith('px') else 6
-            known = f'+- {deviation:.{digits}f}' if deviation else 'assumed'
-            yield f'  {name:14} {value:12.{digits}f}  {known}'
-
-    def _covered(self):
-        edge = np.degrees(self.edge_rad)
-        yield f'coverage points by angle from the axis; the picture shows {edge:.0f} degrees'
-        counts = self.coverage.sum(axis=1)
-        for ring, (count, row) in enumerate(zip(counts, self.coverage, strict=True)):
-            bar = '#' * int(np.ceil(_BAR * count / counts.max()))
-            span = f'{ring * RING_DEG}-{(ring + 1) * RING_DEG}'
-            sectors = np.count_nonzero(row)
-            yield f'  {span:>7} deg {count:5} in {sectors} of {SECTORS} directions  {bar}'
-
-
-def _sector(azimuth_rad: np.ndarray) -> np.ndarray:
-    """Which of `SECTORS` an angle about the axis lies in; the first is to the right."""
-    return ((azimuth_rad / (2 * np.pi) + 1) * SECTORS + 0.5).astype(int) % SECTORS
+        return '\n'.join(report_lines(self))

@@ -11,14 +11,17 @@ from fisheye_core.errors import FileAccessError
 from fisheye_geometry.lens_surface import surface_for
 from fisheye_geometry.remap import RemapTable
 from fisheye_undistort.calibration import Calibration
+from fisheye_undistort.certainty import LIMIT_DEG
+from fisheye_undistort.difference_plot import draw_angles
 from fisheye_undistort.figure_file import check_suffix, write_figure
 from fisheye_undistort.report import CalibrationReport
 
-_SIZE_INCH = (16, 9.5)
-_TITLE = 150
+_SIZE_INCH = (20, 9.5)
+_TITLE = 180
 """Characters in a line of it."""
 _ARROW_WIDTHS = 0.03
 """Length of the longest residual as drawn, in widths of the picture."""
+_RING_DEG = 4.0
 _STRAIGHT_FOV_RAD = np.radians(120)
 
 
@@ -56,15 +59,53 @@ def plot_report(path: str | Path, report: CalibrationReport, example: np.ndarray
     """
     figure = Figure(figsize=_SIZE_INCH, layout='constrained')
     figure.suptitle(fill(report.verdict, _TITLE), fontsize=13)
-    grid = figure.add_gridspec(2, 3)
+    grid = figure.add_gridspec(2, 4)
     calibration = report.calibration
     _points(figure.add_subplot(grid[0, 0]), calibration, report.brightest)
     _residuals(figure.add_subplot(grid[0, 1]), calibration)
     _coverage(figure.add_subplot(grid[0, 2], projection='polar'), report)
+    draw_angles(
+        figure.add_subplot(grid[0, 3]),
+        report.certainty.off_deg,
+        (calibration.lens.width, calibration.lens.height),
+        f'degrees that the lens may be off; red line: {LIMIT_DEG:g}',
+    )
     _distortion(figure.add_subplot(grid[1, 0]), report)
     _views(figure.add_subplot(grid[1, 1]), calibration)
     _undistorted(figure.add_subplot(grid[1, 2]), calibration, example)
+    _by_angle(figure.add_subplot(grid[1, 3]), report)
     write_figure(figure, Path(path), dpi=110)
+
+
+def _by_angle(axes, report: CalibrationReport) -> None:
+    """Draw how far the lens may be off by the angle from the axis."""
+    certainty, halves = report.certainty, report.calibration.halves
+    edges = np.arange(0.0, np.nanmax(certainty.angle_deg) + _RING_DEG, _RING_DEG)
+    angles = (edges[1:] + edges[:-1]) / 2
+    middle, most = certainty.by_angle(edges)
+    axes.semilogy(angles, most, lw=2, label='most all around')
+    axes.semilogy(angles, middle, lw=1, label='median all around')
+    if halves:
+        apart = np.degrees(halves.difference_rad(report.calibration.angles.pixels))
+        axes.semilogy(
+            certainty.angle_deg[certainty.lit],
+            apart[certainty.lit],
+            '.',
+            ms=2,
+            c='0.6',
+            label='between even and odd views',
+        )
+    axes.axhline(LIMIT_DEG, color='r', lw=1)
+    covered = np.degrees(report.calibration.directions_rad[0].max())
+    axes.axvline(covered, color='k', ls=':', lw=1, label='last point')
+    axes.set(
+        title=f'certain out to {certainty.calibrated_deg:.0f} degrees all around',
+        xlabel='angle from the axis, degrees',
+        ylabel='degrees',
+        ylim=(1e-3, 100),
+    )
+    axes.legend(fontsize=8)
+    axes.grid(alpha=0.3)
 
 
 def _points(axes, calibration: Calibration, picture: np.ndarray) -> None:

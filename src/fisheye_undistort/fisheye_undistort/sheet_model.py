@@ -9,7 +9,7 @@ INTRINSICS = ('focal_x_px', 'focal_y_px', 'center_x_px', 'center_y_px', 'k1', 'k
 UNKNOWNS = (*INTRINSICS, 'warp_xx_mm', 'warp_xy_mm', 'warp_yy_mm')
 """What all views have in common."""
 
-_EVEN_POWERS = 2.0 * np.arange(1, 5)
+EVEN_POWERS = 2.0 * np.arange(1, 5)
 
 
 def lens_of(unknowns: np.ndarray, size: tuple[int, int]) -> FisheyeLens:
@@ -48,6 +48,17 @@ def curves(points_mm: np.ndarray) -> np.ndarray:
     return np.stack([x * x, x * y, y * y], axis=-1)
 
 
+def pixels_of(unknowns: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return the pixels (..., 2) of points (..., 3) alone, as `project` does."""
+    x, y, z = np.moveaxis(points, -1, 0)
+    side = np.maximum(np.hypot(x, y), 1e-12)
+    angle = np.arctan2(side, z)
+    square = angle * angle
+    k1, k2, k3, k4 = unknowns[4 : len(INTRINSICS)]
+    scale = angle * (1 + square * (k1 + square * (k2 + square * (k3 + square * k4)))) / side
+    return np.stack([x * scale, y * scale], axis=-1) * unknowns[:2] + unknowns[2:4]
+
+
 def project(unknowns: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Project points as `FisheyeLens` does, with derivatives and without an end of the field.
 
@@ -72,9 +83,9 @@ def project(unknowns: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.nd
     coefficients = unknowns[4 : len(INTRINSICS)]
     side = np.maximum(np.hypot(x, y), 1e-12)
     angle = np.arctan2(side, z)
-    powers = angle[:, None] ** _EVEN_POWERS
+    powers = angle[:, None] ** EVEN_POWERS
     growth = 1 + powers @ coefficients
-    slope = 1 + powers @ (coefficients * (_EVEN_POWERS + 1))
+    slope = 1 + powers @ (coefficients * (EVEN_POWERS + 1))
     toward = np.stack([x, y], axis=-1) / side[:, None]
     plane = toward * (angle * growth)[:, None]
     by_intrinsics = np.zeros((len(points), 2, len(INTRINSICS)))

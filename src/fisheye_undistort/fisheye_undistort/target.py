@@ -3,17 +3,18 @@
 from dataclasses import dataclass
 from functools import cached_property
 
-import cv2
 import numpy as np
 
 from fisheye_core.errors import SettingError
+from fisheye_undistort.marker_dictionary import dictionary_named
 
-KINDS = ('circles', 'acircles', 'chessboard', 'charuco')
+KINDS = ('circles', 'acircles', 'chessboard', 'charuco', 'aprilgrid')
 MARKERS = 'DICT_4X4_250'
-"""Dictionary of the markers on a `charuco` sheet (OpenCV's name)."""
+"""Dictionary of the markers on a `charuco` sheet where nothing else is said (OpenCV's name)."""
+TAGS = 'DICT_APRILTAG_36h11'
+"""Dictionary of the tags of an `aprilgrid`."""
 
 _MAX_SIDE = 100
-_MAX_MARKERS = 250
 _MAX_SPACING_MM = 10_000
 _SMALLEST_GAP_RADII = 2.5
 """Centres of neighbouring circles are this many radii apart at least: white must be between."""
@@ -30,16 +31,22 @@ class Target:
     ----------
     kind
         One of `KINDS`: filled circles on a regular grid, circles of which every other row is moved
-        by half a column, inner corners of a chessboard, inner corners of a ChArUco board.
+        by half a column, inner corners of a chessboard, inner corners of a ChArUco board, corners
+        of the tags of Kalibr's AprilTag grid.
     rows, columns
-        Number of circles or inner corners; of a ChArUco board: of squares.
+        Number of circles or inner corners; of a ChArUco board: of squares; of a grid: of tags.
     dx_mm, dy_mm
         Distance of neighbouring points (of `acircles`: of neighbouring rows, and half of that of
-        neighbouring circles in one row), or the squares' size.
+        neighbouring circles in one row), the squares' size, or from one tag to the next.
     radius_mm
         Of the circles.
     marker_mm
-        Side of the markers of a ChArUco board.
+        Side of the markers of a ChArUco board, of the tags of a grid.
+    dictionary
+        OpenCV's name of the dictionary that the markers are from.
+    legacy
+        Whether a ChArUco board begins with a white square although its rows are even, as those
+        that OpenCV before 4.6 drew.
     """
 
     kind: str
@@ -49,13 +56,15 @@ class Target:
     dy_mm: float
     radius_mm: float = 0.0
     marker_mm: float = 0.0
+    dictionary: str = MARKERS
+    legacy: bool = False
 
     def __post_init__(self):
         if self.kind not in KINDS:
             raise SettingError(
                 f"target '{self.kind}' is not known; expected one of {', '.join(KINDS)}"
             )
-        smallest = 3 if self.has_squares else 2
+        smallest = 2 if self.has_circles or self.kind == 'aprilgrid' else 3
         for name in ('rows', 'columns'):
             if not smallest <= getattr(self, name) <= _MAX_SIDE:
                 raise SettingError(
@@ -72,11 +81,10 @@ class Target:
             self._check_size('radius_mm', self.radius_mm, self.gap_mm / _SMALLEST_GAP_RADII)
         if self.kind == 'charuco':
             self._check_size('marker_mm', self.marker_mm, 0.9 * min(self.dx_mm, self.dy_mm))
-            if self.rows * self.columns // 2 > _MAX_MARKERS:
-                raise SettingError(
-                    f'a ChArUco board of {self.rows} x {self.columns} squares needs more than '
-                    f'the {_MAX_MARKERS} markers of {MARKERS}'
-                )
+            self._check_markers(self.rows * self.columns // 2)
+        if self.kind == 'aprilgrid':
+            self._check_size('marker_mm', self.marker_mm, 0.95 * min(self.dx_mm, self.dy_mm))
+            self._check_markers(self.rows * self.columns)
         if self.has_squares and self.dx_mm != self.dy_mm:
             raise SettingError(
                 f'the squares of a {self.kind} target are {self.dx_mm:g} x {self.dy_mm:g} mm; '
@@ -89,6 +97,14 @@ class Target:
                 f'{name} is {value:g}; on this sheet expected more than 0 and {limit:g} mm at most'
             )
 
+    def _check_markers(self, needed):
+        there = len(dictionary_named(self.dictionary).bytesList)
+        if needed > there:
+            raise SettingError(
+                f'{self.kind} {self.rows} x {self.columns} needs {needed} markers, more than '
+                f'the {there} markers of {self.dictionary}'
+            )
+
     @property
     def has_circles(self) -> bool:
         """Whether the points are centres of circles, which lens and perspective deform."""
@@ -96,14 +112,21 @@ class Target:
 
     @property
     def has_squares(self) -> bool:
-        """Whether the points are corners of squares."""
+        """Whether the points are corners of squares, or of tags."""
         return not self.has_circles
+
+    @property
+    def has_markers(self) -> bool:
+        """Whether a part of the sheet is enough, for its markers tell which part it is."""
+        return self.kind in ('charuco', 'aprilgrid')
 
     @property
     def gap_mm(self) -> float:
         """Distance of the two nearest points."""
         if self.kind == 'acircles':
             return min(float(np.hypot(self.dx_mm, self.dy_mm)), 2 * self.dx_mm)
+        if self.kind == 'aprilgrid':
+            return min(self.dx_mm - self.marker_mm, self.marker_mm)
         return min(self.dx_mm, self.dy_mm)
 
     @property
@@ -114,8 +137,11 @@ class Target:
     @cached_property
     def cells(self) -> np.ndarray:
         """Column and row of each point in units of (dx, dy), (N, 2) int, row after row."""
-        inner = 1 if self.kind == 'charuco' else 0
-        row, column = np.mgrid[: self.rows - inner, : self.columns - inner].reshape(2, -1)
+        rows, columns = {
+            'charuco': (self.rows - 1, self.columns - 1),
+            'aprilgrid': (2 * self.rows, 2 * self.columns),
+        }.get(self.kind, (self.rows, self.columns))
+        row, column = np.mgrid[:rows, :columns].reshape(2, -1)
         if self.kind == 'acircles':
             column = 2 * column + row % 2
         return np.stack([column, row], axis=-1)
@@ -123,13 +149,26 @@ class Target:
     @cached_property
     def points_mm(self) -> np.ndarray:
         """Points in the target's frame, (N, 3) float64."""
-        plane = (self.cells - self.cells.max(axis=0) / 2) * (self.dx_mm, self.dy_mm)
+        if self.kind == 'aprilgrid':
+            plane = self.cells // 2 * self.dx_mm + self.cells % 2 * self.marker_mm
+            plane = plane - plane.max(axis=0) / 2
+        else:
+            plane = (self.cells - self.cells.max(axis=0) / 2) * (self.dx_mm, self.dy_mm)
         return np.concatenate([plane, np.zeros((len(plane), 1))], axis=-1)
+
+    def name_of(self, point: int) -> str:
+        """Return the row and column of a point, counted from 1 at the top left of the sheet."""
+        column, row = self.cells[point]
+        return f'row {row + 1}, column {column + 1}'
 
     def __str__(self):
         shape = f'{self.kind} {self.rows} x {self.columns} (rows x columns)'
+        if self.kind == 'aprilgrid':
+            return f'{shape}, tags {self.marker_mm:g} mm, {self.dx_mm:g} mm from tag to tag'
         if self.has_squares:
-            markers = f', markers {self.marker_mm:g} mm' if self.kind == 'charuco' else ''
+            markers = f', markers {self.marker_mm:g} mm' if self.has_markers else ''
+            markers += f' of {self.dictionary}' if self.dictionary != MARKERS else ''
+            markers += ', legacy layout' if self.legacy else ''
             return f'{shape}, squares {self.dx_mm:g} mm{markers}'
         return f'{shape}, dx {self.dx_mm:g} mm, dy {self.dy_mm:g} mm, radius {self.radius_mm:g} mm'
 
@@ -140,21 +179,6 @@ STANDARD = {
     'acircles': Target('acircles', 11, 4, 20.0, 20.0, radius_mm=8.0),
     'chessboard': Target('chessboard', 6, 9, 25.0, 25.0),
     'charuco': Target('charuco', 5, 7, 35.0, 35.0, marker_mm=26.0),
+    'aprilgrid': Target('aprilgrid', 6, 6, 28.6, 28.6, marker_mm=22.0, dictionary=TAGS),
 }
 """The sheet of each kind where nothing else is said."""
-
-
-def marker_dictionary():
-    """Return OpenCV's dictionary of the markers on a `charuco` sheet.
-
-    Raises
-    ------
-    SettingError
-        If this OpenCV cannot read markers.
-    """
-    if not hasattr(cv2, 'aruco'):
-        raise SettingError(
-            f'target is charuco, and OpenCV {cv2.__version__} here is built without its markers; '
-            'expected OpenCV 4.7 or later, or another target'
-        )
-    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, MARKERS))

@@ -10,7 +10,8 @@ from matplotlib.patches import Circle, Rectangle
 
 from fisheye_core.errors import SettingError
 from fisheye_undistort.figure_file import check_suffix, write_figure
-from fisheye_undistort.target import Target, marker_dictionary
+from fisheye_undistort.marker_dictionary import dictionary_named
+from fisheye_undistort.target import Target
 
 _PAPERS_MM = {
     'A4': (210, 297),
@@ -85,7 +86,11 @@ def paper_for(target: Target) -> tuple[str, tuple[float, float]]:
 
 def _pattern_size(target: Target) -> np.ndarray:
     """Width and height of what is printed dark, mm."""
-    border = 2 * (target.radius_mm if target.has_circles else target.dx_mm)
+    border = 2 * {
+        'aprilgrid': target.dx_mm - target.marker_mm,
+        'chessboard': target.dx_mm,
+        'charuco': target.dx_mm,
+    }.get(target.kind, target.radius_mm)
     return np.ptp(target.points_mm[:, :2], axis=0) + border
 
 
@@ -97,8 +102,9 @@ def _draw(target: Target, paper: str, size_mm: tuple[float, float]) -> Figure:
     axes.set_axis_off()
     left = -(width + _STRIP_MM) / 2
     axes.set(xlim=(left, left + width), ylim=(height / 2, -height / 2))
-    for shape in _circles(target) if target.has_circles else _squares(target):
-        axes.add_patch(shape)
+    for shape in _SHAPES[target.kind](target):
+        # Nothing may move to the next whole pixel.
+        axes.add_patch(shape).set_snap(False)
     edge = left + _MARGIN_MM
     _ruler(axes, edge)
     text = f'{target}\n{paper}: print at 100 % ("actual size") and check the ruler'
@@ -116,34 +122,59 @@ def _squares(target: Target):
     side = target.dx_mm
     rows, columns = (n + (target.kind == 'chessboard') for n in (target.rows, target.columns))
     corner = -np.array([columns, rows]) * side / 2
-    markers = _marker_bits(target)
+    markers = _marker_cells(target, 1) if target.has_markers else None
+    first = target.legacy and rows % 2 == 0
     for row, column in np.ndindex(rows, columns):
         x, y = corner + np.array([column, row]) * side
-        if (row + column) % 2 == 0:
+        if (row + column) % 2 == first:
             yield Rectangle((x, y), side, side, color='black', lw=0)
         elif markers:
             yield from _marker(next(markers), x + side / 2, y + side / 2, target.marker_mm)
 
 
-def _marker_bits(target: Target):
-    """Black cells of one marker after another, (n, n) bool each; None on a chessboard."""
-    if target.kind != 'charuco':
-        return None
-    dictionary = marker_dictionary()
+def _tags(target: Target):
+    """Tags as Kalibr's grid has them: the first at the bottom left, squares at their corners."""
+    cells = [*zip(range(target.rows * target.columns), _marker_cells(target, 2), strict=False)]
+    side, gap = target.marker_mm, target.dx_mm - target.marker_mm
+    corners = target.points_mm[:, :2].reshape(2 * target.rows, 2 * target.columns, 2)
+    for number, black in cells:
+        row, column = target.rows - 1 - number // target.columns, number % target.columns
+        x, y = corners[2 * row, 2 * column]
+        # White on black: what is drawn must end exactly where the corner is.
+        yield Rectangle((x, y), side, side, color='black', lw=0)
+        yield from _marker(~black, x + side / 2, y + side / 2, side, 'white')
+    for row, column in np.ndindex(target.rows + 1, target.columns + 1):
+        x, y = corners[0, 0] + np.array([column, row]) * target.dx_mm - gap
+        yield Rectangle((x, y), gap, gap, color='black', lw=0)
+
+
+_SHAPES = {
+    'circles': _circles,
+    'acircles': _circles,
+    'chessboard': _squares,
+    'charuco': _squares,
+    'aprilgrid': _tags,
+}
+"""What is printed dark."""
+
+
+def _marker_cells(target: Target, border: int):
+    """Black cells of one marker after another, (n, n) bool each, with a border of black ones."""
+    dictionary = dictionary_named(target.dictionary)
     side = dictionary.markerSize
     unpack = cv2.aruco.Dictionary_getBitsFromByteList
     return (
-        np.pad(unpack(code[None], side) == 0, 1, constant_values=True)
+        np.pad(unpack(code[None], side) == 0, border, constant_values=True)
         for code in dictionary.bytesList
     )
 
 
-def _marker(black: np.ndarray, x: float, y: float, size: float):
-    cell = size / len(black)
-    for row, column in np.argwhere(black):
+def _marker(cells: np.ndarray, x: float, y: float, size: float, color: str = 'black'):
+    cell = size / len(cells)
+    for row, column in np.argwhere(cells):
         corner = (x - size / 2 + column * cell, y - size / 2 + row * cell)
         # The thin outline closes the hairlines that viewers leave between neighbours.
-        yield Rectangle(corner, cell, cell, color='black', lw=0.05 * _POINTS_PER_MM)
+        yield Rectangle(corner, cell, cell, color=color, lw=0.05 * _POINTS_PER_MM)
 
 
 def _ruler(axes, x: float) -> None:

@@ -26,6 +26,7 @@ def fisheye(fov_deg: int, scale: int = 1) -> FisheyeLens:
         321.8 * scale,
         237.6 * scale,
         distortion,
+        visible_angle_rad=np.radians(fov_deg / 2 + 1),
     )
 
 

@@ -1,3 +1,5 @@
+import json
+import re
 import sys
 
 import cv2
@@ -40,6 +42,32 @@ def test_a_good_calibration(shots, paper_lens, tmp_path, capsys):
     assert 'verdict  good' in capsys.readouterr().out
 
 
+def test_how_far_it_is_calibrated_stands_in_the_file_and_beside_it(shots, tmp_path, capsys):
+    output = tmp_path / 'left.yaml'
+    assert main([str(shots), '--name', 'left', '-o', str(output)]) == GOOD
+    report = json.loads((tmp_path / 'left.report.json').read_text())
+    assert report['camera_name'] == 'left'
+    assert report['good']
+    assert 80 < report['calibrated_deg'] < 90
+    first = output.read_text().splitlines()[0]
+    assert first.startswith(f'# calibrated out to {report["calibrated_deg"]:.1f} degrees')
+    assert (
+        f'certain  to 0.5 degrees out to {report["calibrated_deg"]:.0f}' in capsys.readouterr().out
+    )
+
+
+def test_what_is_written_for_kalibr_is_converted_back_and_compared(shots, tmp_path, capsys):
+    ours, chain, back = (tmp_path / name for name in ('ours.yaml', 'chain.yaml', 'back.yaml'))
+    assert main([str(shots), '-o', str(ours)]) == GOOD
+    assert main(['--convert', str(ours), '--to', 'kalibr', '-o', str(chain)]) == GOOD
+    assert 'distortion_model: equidistant' in chain.read_text()
+    assert main(['--convert', str(chain), '-o', str(back)]) == GOOD
+    plot = tmp_path / 'difference.png'
+    assert main(['--compare', str(ours), str(back), '--plot', str(plot)]) == GOOD
+    assert 'difference up to 0.000 degrees' in capsys.readouterr().out
+    assert cv2.imread(str(plot)).shape[1] > 500
+
+
 def test_a_poor_one_is_written_all_the_same(shots, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main([str(shots / 'shot01.png'), '--name', 'rear']) == POOR
@@ -78,19 +106,23 @@ def test_no_target_anywhere(tmp_path, capsys):
     assert 'none of 1 pictures' in refused(capsys, tmp_path)
 
 
-def test_pictures_of_different_sizes(shots, tmp_path, capsys):
-    cv2.imwrite(str(tmp_path / 'small.png'), np.zeros((240, 320), np.uint8))
-    told = refused(capsys, shots, tmp_path / 'small.png')
-    assert 'small.png has 320x240 px' in told
-
-
 def test_a_wrong_number_of_rows(shots, capsys):
     assert '3 x 3 (rows x columns), found; expected 4 rows' in refused(capsys, shots, '--rows', 4)
 
 
-def test_an_unreadable_file(shots, tmp_path, capsys):
+def test_an_unreadable_and_a_foreign_file_are_skipped_by_name(shots, tmp_path, capsys):
     (tmp_path / 'broken.jpg').write_bytes(b'broken')
-    assert 'broken.jpg is not a picture' in refused(capsys, shots, tmp_path / 'broken.jpg')
+    cv2.imwrite(str(tmp_path / 'small.png'), np.zeros((240, 320), np.uint8))
+    output = str(tmp_path / 'camera.yaml')
+    assert main([str(shots), str(tmp_path), '-o', output]) == GOOD
+    told = capsys.readouterr().out
+    assert re.search(r'broken\.jpg +not used: .*broken\.jpg is not a picture', told)
+    assert re.search(r'small\.png +not used: has 320x240 px; most have 640x480 px', told)
+
+
+def test_nothing_but_an_unreadable_file(tmp_path, capsys):
+    (tmp_path / 'broken.jpg').write_bytes(b'broken')
+    assert 'broken.jpg is not a picture' in refused(capsys, tmp_path / 'broken.jpg')
 
 
 def test_all_views_alike(shots, tmp_path, capsys):
@@ -109,6 +141,10 @@ def test_all_views_alike(shots, tmp_path, capsys):
         (['x.png', '--radius-mm', '90'], 'radius_mm is 90'),
         (['--print', 'sheet.docx'], "'sheet.docx'"),
         (['nowhere.png'], 'nowhere.png is not there'),
+        (['nowhere.png', '--seam-deg', '-1'], '--seam-deg is -1; expected 0 to 180 degrees'),
+        (['--convert', 'nowhere.yaml'], 'nowhere.yaml cannot be read'),
+        (['--compare', 'nowhere.yaml', 'x.yaml'], 'nowhere.yaml cannot be read'),
+        (['x.png', '--target', 'charuco', '--dictionary', 'D'], "dictionary 'D' is not known"),
         (['nowhere.png', '--name', 'a/b'], "--name is 'a/b'; expected a word without '/'"),
     ],
 )

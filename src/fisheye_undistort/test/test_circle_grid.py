@@ -5,7 +5,7 @@ from conftest import fisheye
 from rendered_view import Look, facing_pose, render_view
 
 from fisheye_core.errors import ImageFormatError, SettingError
-from fisheye_undistort.circle_grid import area_limits, find_circles
+from fisheye_undistort.circle_grid import area_bands, find_circles
 from fisheye_undistort.grid_order import order_grid
 from fisheye_undistort.target import STANDARD
 
@@ -74,11 +74,18 @@ def test_particles_are_filtered_by_area():
 
 
 def test_limits_follow_the_size_of_the_picture():
-    assert area_limits((480, 640)) == (100, 10_000)
-    assert area_limits((960, 1280)) == (400, 40_000)
-    assert area_limits((960, 1280), 50, 0) == (50, 40_000)
+    assert area_bands((480, 640))[0] == (100, 10_000)
+    assert area_bands((960, 1280))[0] == (400, 40_000)
+    assert area_bands((960, 1280), 50, 0)[0] == (50, 40_000)
+    assert area_bands((960, 1280), 50, 500) == [(50, 500)]
+
+
+def test_smaller_and_larger_circles_are_tried_too():
+    bands = area_bands((480, 640))
+    assert min(low for low, _ in bands) < 20
+    assert max(high for _, high in bands) > 30_000
     with pytest.raises(SettingError, match='500 to 200'):
-        area_limits((480, 640), 500, 200)
+        area_bands((480, 640), 500, 200)
 
 
 def test_an_empty_picture_has_no_circles():

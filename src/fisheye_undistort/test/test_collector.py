@@ -102,3 +102,17 @@ def test_the_brightest_and_an_example_are_remembered(collector):
     assert collector.brightest[5, 5] == 250
     assert collector.brightest[0, 0] == 150
     assert collector.example.shape == SIZE[::-1]
+
+
+def test_where_to_show_it_next_is_told_where_the_lens_sees_anything(collector):
+    first = shot('a', 300, 180)
+    first.gray[:, :320] = 0
+    first.gray[:, 320:] = 200
+    first.gray[0, :2] = 150, 90
+    collector.add(first)
+    assert 'show it at the ' in collector.progress()
+    assert 'left' not in collector.progress()
+    second = shot('b', 400, 300)
+    second.gray[1:] = 200
+    collector.add(second)
+    assert 'left' in collector.progress()

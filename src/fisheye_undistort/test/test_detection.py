@@ -1,16 +1,20 @@
 import numpy as np
 import pytest
 from conftest import fisheye, seen_exactly
+from foreign_lenses import foreign_lens
 from rendered_view import Look, facing_pose, render_view, scattered_poses
 
 from fisheye_core.errors import CalibrationError
 from fisheye_undistort.calibration import calibrate
 from fisheye_undistort.detection import Detector
-from fisheye_undistort.target import STANDARD, Target
+from fisheye_undistort.target import STANDARD, TAGS, Target
 
 CORNER_PX = 0.25
 """Corners of squares are blurred by the lens and placed by what is around them."""
 FOCAL = 0.003
+
+
+TAGS_640 = Target('aprilgrid', 4, 4, 44.0, 44.0, marker_mm=34.0, dictionary=TAGS)
 
 
 @pytest.mark.parametrize('kind', ['chessboard', 'charuco'])
@@ -36,10 +40,59 @@ def test_a_charuco_board_may_be_half_out_of_the_picture():
     assert np.linalg.norm(view.points_px - truth[view.ids], axis=-1).max() < CORNER_PX
 
 
-@pytest.mark.parametrize('kind', ['acircles', 'chessboard', 'charuco'])
-def test_every_kind_calibrates(kind):
-    lens, target = fisheye(170), STANDARD[kind]
-    detect = Detector(target, min_area_px=40)
+def test_corners_of_tags_are_found_where_they_are_whichever_way_up():
+    lens = fisheye(170)
+    for turn in (0.1, 1.7, 3.2):
+        pose = facing_pose(0.8, 0.3, 170, (0.2, -0.3, turn))
+        view = Detector(TAGS_640)('shot', render_view(lens, TAGS_640, pose))
+        truth = seen_exactly(lens, TAGS_640, pose).points_px[view.ids]
+        assert len(view.ids) > 50
+        off_px = np.linalg.norm(view.points_px - truth, axis=-1)
+        assert np.mean(off_px < CORNER_PX) > 0.9
+
+
+def test_a_grid_of_tags_may_be_half_out_of_the_picture():
+    lens = fisheye(170)
+    pose = facing_pose(0.0, 1.2, 170)
+    view = Detector(TAGS_640)('shot', render_view(lens, TAGS_640, pose))
+    assert 8 <= len(view.ids) < 64
+
+
+def test_a_chessboard_that_the_quick_check_throws_away_is_found():
+    """At the edge of a stereographic lens the squares are of very different sizes."""
+    lens, target = foreign_lens('stereographic', 220), STANDARD['chessboard']
+    poses = scattered_poses(lens, target, 6, (90, 250), seed=3)
+    pictures = [render_view(lens, target, pose, seed=i) for i, pose in enumerate(poses)]
+    assert all(len(Detector(target)('', picture).ids) == 54 for picture in pictures)
+
+
+def test_a_chessboard_of_a_large_picture_is_refined_at_full_size():
+    lens, target = foreign_lens('equisolid', 180, 2000, 1500), STANDARD['chessboard']
+    pose = facing_pose(0.8, 0.3, 250, (0.2, -0.3, 0.1))
+    view = Detector(target)('shot', render_view(lens, target, pose, Look(blur_px=1.2)))
+    truth = seen_exactly(lens, target, pose).points_px
+    off_px = min(
+        np.linalg.norm(view.points_px - order, axis=-1).max() for order in (truth, truth[::-1])
+    )
+    assert off_px < CORNER_PX
+
+
+@pytest.mark.parametrize(
+    'target', [STANDARD['acircles'], Target('circles', 7, 10, 26.0, 26.0, radius_mm=9.5)], ids=str
+)
+def test_circles_of_any_size_are_found_without_a_limit(target):
+    lens = foreign_lens('equisolid', 180)
+    poses = scattered_poses(lens, target, 6, (110, 300), seed=1)
+    for number, pose in enumerate(poses):
+        view = Detector(target)('', render_view(lens, target, pose, seed=number))
+        assert len(view.ids) >= 0.93 * len(target.cells)
+
+
+@pytest.mark.parametrize('target', [STANDARD[k] for k in ('acircles', 'chessboard', 'charuco')]
+                         + [TAGS_640], ids=str)  # fmt: skip
+def test_every_kind_calibrates(target):
+    lens = fisheye(170)
+    detect = Detector(target)
     poses = scattered_poses(lens, target, 10, (110, 170))
     views = [detect('', render_view(lens, target, p, seed=i)) for i, p in enumerate(poses)]
     found = calibrate(views, target, (lens.width, lens.height)).lens

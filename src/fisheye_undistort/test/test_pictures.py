@@ -1,3 +1,5 @@
+import re
+
 import cv2
 import numpy as np
 import pytest
@@ -5,6 +7,9 @@ import pytest
 from fisheye_core.errors import SourceError
 from fisheye_testing.odd_pictures import huge_png, turned
 from fisheye_undistort.pictures import read_pictures
+
+HEIC = b'\0\0\0\x18ftypheic\0\0\0\0mif1heic'
+FLOAT = cv2.imencode('.tif', np.linspace(0, 1, 48, dtype=np.float32).reshape(6, 8))[1].tobytes()
 
 
 def grey(value, width=64, height=48):
@@ -69,18 +74,27 @@ def test_a_video_gives_ten_frames_a_second(tmp_path):
 @pytest.mark.parametrize(
     ('name', 'content', 'told'),
     [
-        ('missing.png', None, 'missing.png is not there'),
         ('broken.png', b'nothing like a picture', 'broken.png is not a picture'),
         ('empty.jpg', b'', 'empty.jpg is not a picture'),
         ('huge.png', huge_png(), 'huge.png is not a picture'),
-        ('x' * 300, None, 'x is not there'),
         ('broken.mp4', b'nothing like a video', 'broken.mp4 is not a video'),
+        ('phone.heic', HEIC, 'phone.heic is not a picture that can be read: it is HEIC'),
+        ('float.tif', FLOAT, 'float.tif is not .* its pixels are float32; expected whole numbers'),
     ],
+    ids=lambda value: value if isinstance(value, str) else '',
 )
-def test_what_cannot_be_read_is_named(name, content, told, tmp_path):
-    if content is not None:
-        (tmp_path / name).write_bytes(content)
-    with pytest.raises(SourceError, match=told):
+def test_what_cannot_be_read_is_named_and_the_rest_is_read(name, content, told, folder):
+    (folder / name).write_bytes(content)
+    pictures = list(read_pictures([folder]))
+    problems = [picture for picture in pictures if picture.problem]
+    assert [picture.name for picture in problems] == [name]
+    assert re.search(told, problems[0].problem)
+    assert len(pictures) == 4
+
+
+@pytest.mark.parametrize('name', ['missing.png', 'x' * 300])
+def test_what_is_not_there_is_an_error(name, tmp_path):
+    with pytest.raises(SourceError, match='is not there'):
         list(read_pictures([tmp_path / name]))
 
 

@@ -3,7 +3,8 @@ import numpy as np
 import pytest
 
 from fisheye_core.errors import SettingError
-from fisheye_undistort.target import KINDS, STANDARD, Target, marker_dictionary
+from fisheye_undistort.marker_dictionary import dictionary_named
+from fisheye_undistort.target import KINDS, MARKERS, STANDARD, Target
 
 
 def test_every_kind_has_a_standard_sheet():
@@ -25,6 +26,20 @@ def test_every_other_row_of_acircles_is_moved():
 
 def test_a_charuco_board_has_inner_corners_only():
     assert len(STANDARD['charuco'].points_mm) == 4 * 6
+
+
+def test_a_grid_of_tags_has_four_corners_each():
+    target = STANDARD['aprilgrid']
+    points = target.points_mm.reshape(12, 12, 3)
+    assert np.allclose(np.diff(points[0, :, 0]), [22, 6.6] * 5 + [22])
+    assert np.allclose(np.diff(points[:, 0, 1]), [22, 6.6] * 5 + [22])
+    assert np.isclose(target.gap_mm, 6.6)
+
+
+@pytest.mark.parametrize('dictionary', ['DICT_9X9_1', 'NO'])
+def test_a_dictionary_that_opencv_does_not_know_is_refused(dictionary):
+    with pytest.raises(SettingError, match=f"dictionary '{dictionary}' is not known; expected"):
+        Target('charuco', 5, 7, 35.0, 35.0, marker_mm=26.0, dictionary=dictionary)
 
 
 def test_points_are_centred():
@@ -55,5 +70,5 @@ def test_impossible_targets_are_refused_by_name(arguments, told):
 
 def test_an_opencv_without_markers_is_said(monkeypatch):
     monkeypatch.delattr(cv2, 'aruco')
-    with pytest.raises(SettingError, match='target is charuco, and OpenCV'):
-        marker_dictionary()
+    with pytest.raises(SettingError, match='the target has markers, and OpenCV'):
+        dictionary_named(MARKERS)
