@@ -19,6 +19,7 @@ from panorama_stitch.compose.gain import GainCompensation
 from panorama_stitch.compose.layout import covered, lay_out
 from panorama_stitch.compose.placing import place
 from panorama_stitch.compose.posing import views_at_overlaps
+from panorama_stitch.compose.seam_angle import seam_angle_rad
 from panorama_stitch.compose.view import View
 from panorama_stitch.overlap.overlap_result import Overlap
 
@@ -33,6 +34,8 @@ LENS = make_lens(
     [111.526, 0, 159.5, 0, 111.526, 119.5, 0, 0, 1],
     [-0.02, 0.004, -0.001, 0.0001],
 ).with_max_angle(np.radians(92))
+SEAM_DEG = 2.0
+"""Rows of a panorama whose middle is not quite level; seams begin and end in whole columns."""
 SMALL_OBJECTS_BYTES = 20_000
 """Slices and the like, a fiftieth of a small panorama; they are freed at once."""
 SURFACE = surface_for(LENS)
@@ -288,3 +291,13 @@ def test_flow_shows_the_scene_and_fades_where_it_may_not_or_has_no_time(
     for options in ({'economical': True}, {'are_live': False}):
         compositor.compose(images, out, **options)
         assert np.abs(out.astype(int) - faded).max() <= 1
+
+
+def test_seams_lie_half_way_between_the_axes(pictures):
+    views, _ = views_of(pictures, corrected=False)
+    placed = placed_at(views, (OFFSET, 0))
+    layout = lay_out(placed, fade_px=10.0, crop='valid')
+    compositor = Compositor(layout, placed)
+    expected = [np.degrees(YAW / 2)] * 2
+    angles = [np.degrees(seam_angle_rad(compositor, index)) for index in (0, 1)]
+    assert np.allclose(angles, expected, atol=SEAM_DEG)

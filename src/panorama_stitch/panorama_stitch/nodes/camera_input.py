@@ -10,7 +10,7 @@ from fisheye_bridge.diagnostics import ERROR, WARN, DropCounter, Report
 from fisheye_bridge.parameters import Parameters
 from fisheye_bridge.stamps import ns_of, stamp_of
 from fisheye_bridge.topics import ImagePublisher
-from fisheye_capture.calibration_url import calibration_of
+from fisheye_capture.calibration_url import calibration_of, calibration_path
 from fisheye_capture.capture_settings import CameraSettings, CaptureSettings, FrameSettings
 from fisheye_capture.region import AnyFrame, region_named
 from fisheye_capture.source import shown_source
@@ -18,6 +18,8 @@ from fisheye_core.errors import CameraFileError, FisheyeError
 from fisheye_geometry.camera import Camera
 from fisheye_geometry.image_circle import LensWithImageCircle
 from fisheye_geometry.lens import Lens
+from fisheye_undistort.calibrated_angle import calibrated_deg
+from panorama_stitch.compose.seam_angle import seam_angle_rad
 from panorama_stitch.nodes.base_node import PanoramaBase
 from panorama_stitch.nodes.frame_reader import TOPIC, Reader, reader_for
 from panorama_stitch.pipeline.panorama_settings import PanoramaSettings
@@ -54,6 +56,8 @@ class LocalCamera(CameraInput):
         self._raw = None if is_topic else ImagePublisher(node, f'{name}/image_raw')
         camera = self._calibration(reader)
         self._camera, self._seen, self._fault = camera, LensWithImageCircle(camera.lens), ''
+        file = calibration_path(own.camera_info_url, own.camera_name)
+        self._calibrated_deg = calibrated_deg(file) if file else None
         self._broken = DropCounter(node, f'a picture of {name}', f'{name} broken')
         self.place(node.settings)
         reader.add(name, self._take)
@@ -65,10 +69,26 @@ class LocalCamera(CameraInput):
 
     def report(self, report: Report) -> None:
         """Report what is wrong with the camera, and its numbers."""
-        for level, sentence in ((ERROR, self._fault), (WARN, self._seen.note)):
+        faults = (ERROR, self._fault), (WARN, self._seen.note), (WARN, self._beyond)
+        for level, sentence in faults:
             if sentence:
                 report.add(level, f'{self._name}: {sentence}')
         self._broken.tell(report)
+
+    @property
+    def _beyond(self) -> str:
+        """A sentence if a seam lies where the lens is not known; '' if not."""
+        compositor = self._node.pipeline.compositor
+        if compositor is None or self._calibrated_deg is None:
+            return ''
+        index = self._node.settings.cameras.index(self._name)
+        seam_deg = np.degrees(seam_angle_rad(compositor, index))
+        if seam_deg <= self._calibrated_deg:
+            return ''
+        return (
+            f'its seam lies {seam_deg:.0f} degrees off the axis of the lens, which is calibrated '
+            f'out to {self._calibrated_deg:.0f} degrees; calibrate with views that reach farther'
+        )
 
     def _calibration(self, reader: Reader) -> Camera:
         own = self._settings
