@@ -10,12 +10,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from certainty import real_views, rendered_lenses
 from matplotlib.figure import Figure
 from rendered_view import render_view, scattered_poses
 
 from fisheye_geometry.lens import FisheyeLens
 from fisheye_undistort.calibration import calibrate
 from fisheye_undistort.detection import Detector
+from fisheye_undistort.estimate import TargetView
 from fisheye_undistort.target import STANDARD, Target
 
 VIEWS = 12
@@ -33,6 +35,7 @@ GRIDS = {
     70: Target('circles', 7, 10, 26.0, 26.0, radius_mm=9.5),
     140: Target('circles', 10, 14, 18.0, 18.0, radius_mm=6.8),
 }
+VIEWS_TIMED = (25, 50, 100, 200)
 WIDTHS = (320, 640, 1280, 1920, 2560)
 
 
@@ -86,8 +89,7 @@ def measure(
     truth: FisheyeLens, target: Target, pictures, *, correct_bias=True
 ) -> CalibrationResult:
     """Calibrate from pictures and compare with the truth."""
-    # Small circles are wanted here: the particle filter's limit is that of a 640x480 picture.
-    detect = Detector(target, min_area_px=60.0)
+    detect = Detector(target)
     started = time.perf_counter()
     views = [detect(str(number), picture) for number, picture in enumerate(pictures)]
     found = time.perf_counter()
@@ -159,6 +161,22 @@ def against_size() -> list[tuple[str, float]]:
     return rows
 
 
+def against_views() -> None:
+    """Print the time to fit against the number of views of 70 points."""
+    print('\nviews  fit, s (70 points each, halves and covariance included)')
+    truth, target = fisheye(170, 1280), GRIDS[70]
+    random = np.random.default_rng(0)
+    views = []
+    for pose in scattered_poses(truth, target, max(VIEWS_TIMED), (100, 270)):
+        points = target.points_mm @ pose.rotation.T + pose.translation_mm
+        pixels = truth.project(points)[0] + random.normal(0, 0.1, (len(points), 2))
+        views.append(TargetView(str(len(views)), pixels, np.arange(len(points))))
+    for count in VIEWS_TIMED:
+        started = time.perf_counter()
+        calibrate(views[:count], target, (truth.width, truth.height), correct_bias=False)
+        print(f'{count:5}  {time.perf_counter() - started:6.2f}')
+
+
 def draw(circles: list[tuple[int, CalibrationResult]], sizes: list[tuple[str, float]]) -> None:
     """Draw both tables."""
     figure = Figure(figsize=(12, 4.5), layout='constrained')
@@ -185,4 +203,7 @@ def draw(circles: list[tuple[int, CalibrationResult]], sizes: list[tuple[str, fl
 
 if __name__ == '__main__':
     accuracy()
+    against_views()
+    real_views()
+    rendered_lenses()
     draw(against_circles(), against_size())
