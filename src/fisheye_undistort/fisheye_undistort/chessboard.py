@@ -8,7 +8,7 @@ import numpy as np
 
 _PLAIN = cv2.CALIB_CB_ADAPTIVE_THRESH + cv2.CALIB_CB_NORMALIZE_IMAGE
 _QUICK = _PLAIN + cv2.CALIB_CB_FAST_CHECK
-"""The quick check throws boards away that a fisheye lens bends: only good where many follow."""
+"""Its check throws boards away that a fisheye lens bends: only where more pictures follow."""
 _SECTORS = cv2.CALIB_CB_NORMALIZE_IMAGE + cv2.CALIB_CB_EXHAUSTIVE
 _ANY_BOARD = (3, 3)
 """The smallest board that is looked for where the size is not known."""
@@ -27,7 +27,7 @@ class _Attempt:
 
 
 _QUICK_ATTEMPTS = (
-    _Attempt(640, cv2.findChessboardCorners, _QUICK),
+    _Attempt(640, cv2.findChessboardCorners, _PLAIN),
     _Attempt(1280, cv2.findChessboardCorners, _QUICK),
 )
 _ATTEMPTS = (

@@ -1,6 +1,7 @@
 """Look for a target in many pictures at a time."""
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from itertools import islice
 
 import cv2
@@ -38,6 +39,7 @@ def look_at(picture: NamedPicture, detector: Detector) -> Found:
 
 def _job(detector: Detector, picture: NamedPicture, found: list[Found], index: int):
     def job() -> None:
-        found[index] = look_at(picture, detector)
+        own = replace(detector, quick=True) if picture.moving else detector
+        found[index] = look_at(picture, own)
 
     return job
