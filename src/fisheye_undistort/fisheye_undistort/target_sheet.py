@@ -140,9 +140,10 @@ def _tags(target: Target):
     for number, black in cells:
         row, column = target.rows - 1 - number // target.columns, number % target.columns
         x, y = corners[2 * row, 2 * column]
-        # White on black: what is drawn must end exactly where the corner is.
+        # White on black: what is drawn must end exactly where the corner is. Kalibr's tags stand
+        # upside down in OpenCV's dictionary.
         yield Rectangle((x, y), side, side, color='black', lw=0)
-        yield from _marker(~black, x + side / 2, y + side / 2, side, 'white')
+        yield from _marker(~black[::-1, ::-1], x + side / 2, y + side / 2, side, 'white')
     for row, column in np.ndindex(target.rows + 1, target.columns + 1):
         x, y = corners[0, 0] + np.array([column, row]) * target.dx_mm - gap
         yield Rectangle((x, y), gap, gap, color='black', lw=0)

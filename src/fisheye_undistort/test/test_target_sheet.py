@@ -14,6 +14,8 @@ PX_PER_MM = 6.0
 PRINTED_MM = 0.02
 """What the raster of the picture leaves uncertain."""
 POINT_MM = 25.4 / 72
+FIRST_TAG = 0xD5D628584
+"""Code of the first tag of the family 36h11 (Olson 2011, doi 10.1109/ICRA.2011.5979561)."""
 
 
 @pytest.mark.parametrize('kind', KINDS)
@@ -89,3 +91,14 @@ def test_markers_are_those_of_opencv():
     side = np.linalg.norm(first[1] - first[0]) / PX_PER_MM
     assert abs(side - target.marker_mm) < 0.3
     assert np.all(first.mean(axis=0) < origin)
+
+
+def test_the_first_tag_is_that_of_kalibr_at_the_bottom_left():
+    """Drawn as kalibr_create_target_pdf does: its bits from the last to the first, two borders."""
+    target = STANDARD['aprilgrid']
+    picture, origin = sheet_picture(target, PX_PER_MM)
+    bottom_left = target.points_mm.reshape(12, 12, 3)[10, 0, :2]
+    middle_mm = (np.arange(10) + 0.5) * target.marker_mm / 10
+    x, y = (origin[:, None] + (bottom_left[:, None] + middle_mm) * PX_PER_MM).round().astype(int)
+    bits = np.array([int(bit) for bit in f'{FIRST_TAG:036b}']).reshape(6, 6)
+    assert np.array_equal(picture[y[:, None], x] > 127, np.pad(bits, 2) == 1)
