@@ -121,14 +121,9 @@ def pixels_of(coded: np.ndarray, *, grey: bool = False) -> np.ndarray:
 
 def _why_not(coded: np.ndarray) -> str:
     """Return why a picture cannot be decoded to 8 bits."""
-    if coded[4:8].tobytes() == b'ftyp' and coded[8:12].tobytes() in _HEIF_BRANDS:
-        return (
-            'it is HEIC, which OpenCV cannot decode; expected JPEG, PNG or TIFF: convert it first'
-        )
     image: np.ndarray | None = None
-    if coded.size:
-        with suppress(cv2.error):
-            image = cv2.imdecode(coded, cv2.IMREAD_UNCHANGED)
+    with suppress(cv2.error):
+        image = cv2.imdecode(coded, cv2.IMREAD_UNCHANGED)
     if image is not None:
         return f'its pixels are {image.dtype}; expected whole numbers of 8 or 16 bits'
     return f'{coded.size} bytes are a broken picture'
@@ -154,6 +149,11 @@ def _size_of_other(coded: np.ndarray) -> tuple[int, int]:
             with Image.open(BytesIO(coded.tobytes()), formats=_OTHER_KINDS) as picture:
                 return picture.size
     except (OSError, ValueError, SyntaxError, TypeError, KeyError, struct.error) as error:
+        if coded[4:8].tobytes() == b'ftyp' and coded[8:12].tobytes() in _HEIF_BRANDS:
+            raise ImageFormatError(
+                'it is HEIC, which OpenCV cannot decode; expected JPEG, PNG or TIFF: '
+                'convert it first'
+            ) from error
         raise ImageFormatError(f'{coded.size} bytes are a broken picture') from error
 
 
