@@ -25,6 +25,7 @@ setup(
     extras_require={'test': ['hypothesis', 'pytest']},
     entry_points={
         'console_scripts': [
+            'calibrate_rig = panorama_stitch.turn.calibrate_rig:main',
             'panorama_node = panorama_stitch.nodes.panorama_node:main',
             'stitch_node = panorama_stitch.nodes.stitch_node:main',
         ],

@@ -1,0 +1,59 @@
+"""Write what a turn told: a camera_info file for each camera, and the mounts as parameters."""
+
+from math import degrees
+from pathlib import Path
+
+import numpy as np
+
+from fisheye_core.yaml_file import write_mapping
+from fisheye_geometry.attitude import Attitude
+from fisheye_geometry.camera_file import Camera, write_camera
+from fisheye_geometry.level import DOWN, levelled
+from panorama_stitch.turn.turn_calibration import TurnCalibration
+
+PARAMETERS = 'rig.yaml'
+"""Name of the parameter file."""
+
+
+def mounts_of(attitudes: np.ndarray) -> list[Attitude]:
+    """Return how cameras of attitudes (C, 3, 3) are mounted, yaw 0 midway from first to last."""
+    return [Attitude.of(attitude) for attitude in levelled(list(attitudes), 'imu', gravity=DOWN)]
+
+
+def write_rig(folder: Path, calibration: TurnCalibration) -> list[Path]:
+    """Write NAME.yaml of each camera, and `PARAMETERS` for the nodes of a panorama.
+
+    Parameters
+    ----------
+    folder
+        Where to; it is there.
+    calibration
+        What to write.
+
+    Returns
+    -------
+    list of Path
+        The files.
+
+    Raises
+    ------
+    FileAccessError
+        If one cannot be written.
+    """
+    state, cameras = calibration.fit.state, calibration.cameras
+    paths = [folder / f'{name.replace("/", "_")}.yaml' for name in cameras]
+    for index, (name, path) in enumerate(zip(cameras, paths, strict=True)):
+        write_camera(path, Camera(name, state.lens(index, calibration.sizes[index])))
+    mounts = {
+        f'{name}.{angle}_deg': round(degrees(getattr(mount, f'{angle}_rad')), 3)
+        for name, mount in zip(cameras, mounts_of(state.attitudes), strict=True)
+        for angle in ('yaw', 'pitch', 'roll')
+    }
+    urls = {name: path.resolve().as_uri() for name, path in zip(cameras, paths, strict=True)}
+    lenses = {f'{name}.camera_info_url': url for name, url in urls.items()}
+    nodes: dict[str, dict[str, float | str]] = {}
+    nodes |= {f'/**/{name}/capture': {'camera_info_url': url} for name, url in urls.items()}
+    nodes |= {'/**/stitch': {**mounts}, '/**/panorama': {**lenses, **mounts}}
+    parameters = folder / PARAMETERS
+    write_mapping(parameters, {node: {'ros__parameters': told} for node, told in nodes.items()})
+    return [*paths, parameters]
