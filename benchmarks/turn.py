@@ -147,7 +147,7 @@ def main() -> int:
     parser.add_argument('--out', type=Path, default=Path('out'), help='where results go')
     options = parser.parse_args()
     print(
-        'place     off, m  lens           focal, %  angle, deg  (told)  rotation  vertical  CPU, s'
+        'place     off, m  lens           focal, %  angle, deg   (told)  rotation  vertical  CPU'
     )
     results = []
     for number, (place, off_m) in enumerate(SHORT if options.short else CASES):

@@ -2,24 +2,27 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
-from scipy.optimize import least_squares
-from scipy.sparse import bsr_matrix, csr_matrix, vstack
+from scipy.sparse import csr_matrix, diags, vstack
 
+from panorama_stitch.turn.elimination import Elimination
 from panorama_stitch.turn.expectation import expected, in_metres
 from panorama_stitch.turn.landmarks import only
 from panorama_stitch.turn.sightings import Sightings
 from panorama_stitch.turn.turn_state import OF_CAMERA, WIDTH, TurnState
 
-_ROUNDS, _EVALUATIONS = 3, 12
-_TOLERANCE = 1e-5
+_ROUNDS, _STEPS = 5, 30
+_TOLERANCE = 3e-5
+"""A step that lowers the cost by a smaller share is the last one of its round."""
 _SETTLED = 1e-3
 """Where the cost falls by a smaller share in a round, the fit is done."""
 _LIMIT = 2.0
 """Deviations beyond which a residual counts linearly, and for the last time, ..."""
 _OUTLIER = 6.0
 """... and those from which it does not count at all."""
+_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-8, 1e6
 _LEAST_NOISE_PX = 0.02
 _LEAST_SIGHTINGS = 2
 
@@ -36,8 +39,6 @@ class TurnFit:
         The sightings that it explains; their landmarks are those of the state.
     covariance
         (state.rig_count, state.rig_count) of cameras and angles, as `TurnState.moved` takes them.
-    residuals_px
-        (N, 2), found minus predicted.
     noise_px
         Deviation of one coordinate of a sighting.
     """
@@ -45,7 +46,6 @@ class TurnFit:
     state: TurnState
     seen: Sightings
     covariance: np.ndarray
-    residuals_px: np.ndarray
     noise_px: float
 
 
@@ -76,8 +76,7 @@ def adjust(
     free = _free(state, yaws_known)
     cost = np.inf
     for _ in range(_ROUNDS):
-        problem = _Problem(state, seen, sizes, free, noise_px)
-        state, now = problem.solve()
+        state, now = _Problem(seen, sizes, free, noise_px, not yaws_known).solve(state)
         residuals = seen.pixels - state.predict(seen)
         noise_px = max(1.4826 * float(np.median(np.abs(residuals))), _LEAST_NOISE_PX)
         good = np.linalg.norm(residuals, axis=1) < _OUTLIER * noise_px
@@ -86,8 +85,8 @@ def adjust(
         cost = now if good.all() else np.inf
         state, seen = _without_rare(state, seen.only(good))
         free = _free(state, yaws_known)
-    problem = _Problem(state, seen, sizes, free, noise_px)
-    return TurnFit(state, seen, problem.covariance(), seen.pixels - state.predict(seen), noise_px)
+    covariance = _Problem(seen, sizes, free, noise_px, not yaws_known).covariance(state)
+    return TurnFit(state, seen, covariance, noise_px)
 
 
 def _free(state: TurnState, yaws_known: bool) -> np.ndarray:
@@ -108,53 +107,72 @@ def _without_rare(state: TurnState, seen: Sightings) -> tuple[TurnState, Sightin
 
 
 class _Problem:
-    """Residuals and derivatives as functions of a step from a state, in units of deviations."""
+    """Residuals and derivatives of a state, in units of deviations."""
 
-    def __init__(self, state, seen, sizes, free, noise_px):
-        self._start, self._seen, self._free, self._noise = state, seen, free, noise_px
-        self._sizes = sizes
+    def __init__(
+        self,
+        seen: Sightings,
+        sizes: Sequence[tuple[int, int]],
+        free: np.ndarray,
+        noise_px: float,
+        ahead: bool,
+    ):
+        self._seen, self._free, self._noise = seen, free, noise_px
+        self._expected = partial(expected, sizes=sizes, ahead=ahead)
 
-    def solve(self) -> tuple[TurnState, float]:
-        solution = least_squares(
-            self._residuals,
-            np.zeros(np.count_nonzero(self._free)),
-            self._jacobian,
-            loss='soft_l1',
-            f_scale=_LIMIT,
-            x_scale='jac',
-            tr_solver='lsmr',
-            ftol=_TOLERANCE,
-            max_nfev=_EVALUATIONS,
-        )
-        return in_metres(self._moved(solution.x)), float(solution.cost)
+    def solve(self, state: TurnState) -> tuple[TurnState, float]:
+        """Return the state of least cost near another, and its cost.
 
-    def covariance(self) -> np.ndarray:
+        Levenberg and Marquardt's method. Each step is exact, for landmarks are eliminated: they
+        are many, but none has anything to do with another.
+        """
+        damping, residuals = _DAMPING, self._residuals(state)
+        cost = _cost(residuals)
+        for _ in range(_STEPS):
+            information, gradient = self._normal_equations(state, residuals)
+            while damping < _MOST_DAMPING:
+                after = in_metres(state.moved(self._step(state, information, gradient, damping)))
+                residuals_after = self._residuals(after)
+                cost_after = _cost(residuals_after)
+                if cost_after < cost:
+                    break
+                damping *= 10
+            else:
+                break
+            gain = 1 - cost_after / cost
+            state, residuals, cost = after, residuals_after, cost_after
+            damping = max(damping / 10, _LEAST_DAMPING)
+            if gain < _TOLERANCE:
+                break
+        return state, cost
+
+    def covariance(self, state: TurnState) -> np.ndarray:
         """Return the covariance of cameras and angles, of which landmarks took their part."""
-        jacobian = self._jacobian(np.zeros(np.count_nonzero(self._free)))
-        count = np.count_nonzero(self._free[: self._start.rig_count])
-        information = (jacobian.T @ jacobian).tocsr()
-        shared = information[:count, count:]
-        # No sighting is of two landmarks: their part of the information is made of 3 x 3 blocks.
-        blocks = information[count:, count:].tobsr((3, 3))
-        inverse = bsr_matrix((np.linalg.inv(blocks.data), blocks.indices, blocks.indptr))
-        reduced = (information[:count, :count] - shared @ inverse @ shared.T).toarray()
-        covariance = np.zeros((self._start.rig_count,) * 2)
-        free = np.flatnonzero(self._free[: self._start.rig_count])
-        covariance[np.ix_(free, free)] = np.linalg.inv(reduced)
+        information, _ = self._normal_equations(state, self._residuals(state))
+        free = np.flatnonzero(self._free[: state.rig_count])
+        covariance = np.zeros((state.rig_count,) * 2)
+        covariance[np.ix_(free, free)] = np.linalg.inv(Elimination(information, len(free)).reduced)
         return covariance
 
-    def _moved(self, step) -> TurnState:
-        whole = np.zeros(len(self._free))
-        whole[self._free] = step
-        return self._start.moved(whole)
+    def _step(self, state, information, gradient, damping):
+        count = np.count_nonzero(self._free[: state.rig_count])
+        damped = information + diags(damping * information.diagonal())
+        step = np.zeros(len(self._free))
+        step[self._free] = -Elimination(damped.tocsr(), count).solve(gradient)
+        return step
 
-    def _residuals(self, step):
-        state = self._moved(step)
+    def _normal_equations(self, state, residuals):
+        """Return information and gradient, each residual with the weight that its size has."""
+        weight = diags(1 / np.sqrt(1 + (residuals / _LIMIT) ** 2))
+        jacobian = self._jacobian(state)
+        return (jacobian.T @ weight @ jacobian).tocsr(), jacobian.T @ (weight @ residuals)
+
+    def _residuals(self, state):
         miss = (state.predict(self._seen) - self._seen.pixels) / self._noise
-        return np.concatenate([miss.ravel(), expected(state, self._sizes)[0]])
+        return np.concatenate([miss.ravel(), self._expected(state)[0]])
 
-    def _jacobian(self, step):
-        state, seen = self._moved(step), self._seen
+    def _jacobian(self, state):
+        seen = self._seen
         blocks = np.concatenate(state.derivatives(seen), axis=-1) / self._noise
         columns = np.concatenate(
             [
@@ -173,4 +191,9 @@ class _Problem:
             ),
             shape=(rows, len(self._free)),
         )
-        return vstack([sparse, expected(state, self._sizes)[1]]).tocsc()[:, self._free].tocsr()
+        return vstack([sparse, self._expected(state)[1]]).tocsc()[:, self._free].tocsr()
+
+
+def _cost(residuals: np.ndarray) -> float:
+    """Pseudo-Huber cost."""
+    return float(2 * _LIMIT**2 * np.sum(np.sqrt(1 + (residuals / _LIMIT) ** 2) - 1))

@@ -8,8 +8,12 @@ from scipy.sparse import coo_matrix
 from panorama_stitch.turn.turn_state import OF_CAMERA, WIDTH, TurnState
 
 NEARNESS = 0.3
-"""Of landmarks, 1/m. Only their product with the places shows: this alone makes them metres."""
-_NEARNESS_DEVIATION = 0.5
+"""Of landmarks, 1/m, and how much it differs between them. Only its product with the places shows:
+this alone makes them metres."""
+_MEAN_DEVIATION = 0.5
+"""Of the mean nearness of all landmarks. Where everything is equally near, a camera off the axis
+sees what one with another focal length sees on it: that things are about as near as they differ in
+it is all that tells the two apart."""
 _DEVIATIONS = {
     'k1': 0.1,
     'k2': 0.05,
@@ -22,9 +26,16 @@ _DEVIATIONS = {
 """Of the coefficients of real lenses and the places of cameras from 0."""
 _CENTER_DEVIATION_WIDTHS = 0.03
 _ASPECT_DEVIATION = 0.002
+_BEHIND_DEVIATION = 0.1
+"""Of a nearness below 0, which no thing has."""
+_QUARTILES_APART = 1.35
+"""In deviations of a normal distribution."""
+_LEAST_SPREAD = 1e-3
 
 
-def expected(state: TurnState, sizes: Sequence[tuple[int, int]]) -> tuple[np.ndarray, coo_matrix]:
+def expected(
+    state: TurnState, sizes: Sequence[tuple[int, int]], *, ahead: bool
+) -> tuple[np.ndarray, coo_matrix]:
     """Return how many deviations the unknowns are from what is expected, and the derivatives.
 
     Parameters
@@ -33,6 +44,9 @@ def expected(state: TurnState, sizes: Sequence[tuple[int, int]]) -> tuple[np.nda
         The unknowns.
     sizes
         Width and height of each camera's pictures, px.
+    ahead
+        Whether to hold landmarks ahead of infinity. It keeps a first estimate from taking what is
+        near for far and a place for its opposite, but is a bias where nearness is mostly noise.
 
     Returns
     -------
@@ -71,22 +85,24 @@ def expected(state: TurnState, sizes: Sequence[tuple[int, int]]) -> tuple[np.nda
         for name, value, side in zip(('center_x_px', 'center_y_px'), lens[2:4], size, strict=True):
             add((value - (side - 1) / 2) / deviation, **{name: 1 / deviation})
     landmarks = np.arange(len(state.nearness))
-    unknowns = state.rig_count + 3 * len(landmarks)
+    # The mean of all landmarks is held as if each of them were by so little.
+    each = np.full(len(landmarks), 1 / (_MEAN_DEVIATION * np.sqrt(max(len(landmarks), 1))))
+    behind = np.where(state.nearness < 0, float(ahead) / _BEHIND_DEVIATION, 0.0)
+    nearness = state.rig_count + 3 * landmarks + 2
+    values = np.concatenate([slopes, each, behind])
+    places = (
+        np.concatenate([rows, len(misses) + np.arange(2 * len(landmarks))]),
+        np.concatenate([columns, nearness, nearness]),
+    )
+    shape = (len(misses) + 2 * len(landmarks), state.rig_count + 3 * len(landmarks))
     return (
-        np.concatenate([misses, (state.nearness - NEARNESS) / _NEARNESS_DEVIATION]),
-        coo_matrix(
-            (
-                np.concatenate([slopes, np.full(len(landmarks), 1 / _NEARNESS_DEVIATION)]),
-                (
-                    np.concatenate([rows, len(misses) + landmarks]),
-                    np.concatenate([columns, state.rig_count + 3 * landmarks + 2]),
-                ),
-            ),
-            shape=(len(misses) + len(landmarks), unknowns),
-        ),
+        np.concatenate([misses, (state.nearness - NEARNESS) * each, state.nearness * behind]),
+        coo_matrix((values, places), shape=shape),
     )
 
 
 def in_metres(state: TurnState) -> TurnState:
-    """Scale places and landmarks so that these are as near as is expected."""
-    return state.scaled(NEARNESS / max(float(np.mean(state.nearness)), 1e-3))
+    """Scale places and landmarks so that these lie ahead, as unlike in nearness as expected."""
+    low, middle, high = np.percentile(state.nearness, (25, 50, 75))
+    spread = max(float(high - low) / _QUARTILES_APART, _LEAST_SPREAD)
+    return state.scaled(NEARNESS / (spread if middle > 0 else -spread))

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from fisheye_core.errors import CalibrationError
 from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.remap import RemapTable
 from fisheye_geometry.surface import Surface
@@ -20,8 +19,8 @@ _HIGHEST_RAD = np.radians(62)
 _PATCH = 8
 """Pixels from the middle of a patch to its edge."""
 _LEAST_CONTRAST = 3.0
+_MOST_ZOOM = 1.5
 _STEPS_AROUND = 720
-_LEAST_LIKENESS = 0.25
 
 
 class LevelViews:
@@ -91,20 +90,23 @@ class LevelViews:
         Sightings
             Those that were found.
         """
-        patches = self._patches(reference)
-        place = self._place(seen)
+        place, looks_like = self._place(seen), self._surface.project(self._rays_of(reference))[0]
+        distance = np.linalg.norm(self._state.rays(reference), axis=1)
+        zoom = distance[seen.landmark] / np.linalg.norm(self._state.rays(seen), axis=1)
         found, keep = np.zeros((len(seen), 2)), np.zeros(len(seen), bool)
-        for i in range(len(seen)):
-            patch = patches[seen.landmark[i]]
-            window = self._cut(seen.camera[i], seen.frame[i], place[i], _PATCH + reach_px)
-            if patch is None or window is None:
+        for i, landmark in enumerate(seen.landmark):
+            picture = self._pictures[seen.camera[i]][seen.frame[i]]
+            window = _cut(picture, place[i], _PATCH + reach_px)
+            if window is None:
                 continue
-            score = cv2.matchTemplate(window, patch, cv2.TM_CCOEFF_NORMED)
-            best = _peak(score)
-            if best is None or best[2] < least:
+            original = self._pictures[reference.camera[landmark]][reference.frame[landmark]]
+            patch = _zoomed(original, looks_like[landmark], zoom[i])
+            if patch.std() < _LEAST_CONTRAST:
                 continue
-            keep[i] = True
-            found[i] = np.round(place[i]) + np.array(best[:2]) - reach_px
+            best = _peak(cv2.matchTemplate(window, patch, cv2.TM_CCOEFF_NORMED))
+            if best is not None and best[2] >= least:
+                keep[i] = True
+                found[i] = np.round(place[i]) + np.array(best[:2]) - reach_px
         return self._seen_at(seen.only(keep), found[keep])
 
     def visible(self, seen: Sightings) -> np.ndarray:
@@ -120,25 +122,6 @@ class LevelViews:
             inside = (x >= 0) & (y >= 0) & (x < valid.shape[1]) & (y < valid.shape[0])
             result[mine[inside]] = inner[y[inside], x[inside]] > 250
         return result
-
-    def _patches(self, reference):
-        place = self._surface.project(self._rays_of(reference))[0]
-        patches = []
-        for camera, frame, where in zip(reference.camera, reference.frame, place, strict=True):
-            # The patch must be about where it is in parts of a pixel, too.
-            patch = self._cut(camera, frame, where, _PATCH, exact=True)
-            patches.append(None if patch is None or patch.std() < _LEAST_CONTRAST else patch)
-        return patches
-
-    def _cut(self, camera, frame, where, half, exact=False):
-        picture = self._pictures[camera][frame]
-        x, y = np.round(where).astype(int)
-        height, width = picture.shape
-        if not (half <= x < width - half and half <= y < height - half):
-            return None
-        if exact:
-            return cv2.getRectSubPix(picture, (2 * half + 1,) * 2, tuple(map(float, where)))
-        return picture[y - half : y + half + 1, x - half : x + half + 1]
 
     def _rays_of(self, seen):
         """Rays (N, 3) of the rig at which pixels were seen."""
@@ -166,33 +149,29 @@ class LevelViews:
         return Sightings(seen.camera, seen.frame, seen.landmark, pixels)
 
 
-def yaw_between(first: np.ndarray, second: np.ndarray) -> float:
-    """Return by how much a camera looks to the right of another, rad, from their panoramas.
-
-    Raises
-    ------
-    CalibrationError
-        If the two do not show the same.
-    """
-    spectra = [
-        np.fft.rfft(p / max(float(np.linalg.norm(p)), 1e-6), axis=1) for p in (first, second)
-    ]
-    score = np.fft.irfft((spectra[0] * spectra[1].conj()).sum(axis=0), n=first.shape[1])
-    best = int(np.argmax(score))
-    if score[best] < _LEAST_LIKENESS:
-        raise CalibrationError(
-            f'the cameras do not show the same place (likeness {score[best]:.2f} of their '
-            f'panoramas; expected {_LEAST_LIKENESS} and more): expected pictures of one turn'
-        )
-    return best / first.shape[1] * 2 * np.pi
-
-
 def _surface(focal: float) -> Surface:
     focal = min(focal, _DENSITY)
     width, height = round(2 * np.pi * focal), round(2 * _HIGHEST_RAD * focal)
     return Surface(
         'equirectangular', width, height, width / 2 / np.pi, (width - 1) / 2, (height - 1) / 2
     )
+
+
+def _cut(picture: np.ndarray, where: np.ndarray, half: int) -> np.ndarray | None:
+    """Return the part about a place, or None where the picture ends before."""
+    x, y = np.round(where).astype(int)
+    height, width = picture.shape
+    if not (half <= x < width - half and half <= y < height - half):
+        return None
+    return picture[y - half : y + half + 1, x - half : x + half + 1]
+
+
+def _zoomed(picture: np.ndarray, where: np.ndarray, zoom: float) -> np.ndarray:
+    """Return the patch about a place, as it looks from another distance."""
+    zoom = float(np.clip(zoom, 1 / _MOST_ZOOM, _MOST_ZOOM))
+    shift = _PATCH - zoom * where
+    to_patch = np.array([[zoom, 0, shift[0]], [0, zoom, shift[1]]])
+    return cv2.warpAffine(picture, to_patch, (2 * _PATCH + 1,) * 2)
 
 
 def _peak(score: np.ndarray) -> tuple[float, float, float] | None:

@@ -40,7 +40,7 @@ class RecordNode(Node):
         self._pairing = FramePairing(tuple(topics), _MAX_SKEW_NS)
         self.count = 0
         self.error: FisheyeError | None = None
-        self._subscriptions = [
+        self._inputs = [
             ImageSubscription(self, topic, self._taker(name)) for name, topic in topics.items()
         ]
 

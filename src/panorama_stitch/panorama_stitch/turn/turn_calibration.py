@@ -13,15 +13,16 @@ from panorama_stitch.turn.first_turn import first_camera, first_state
 from panorama_stitch.turn.full_circle import Frame, closing_frame, seen_again
 from panorama_stitch.turn.halves import Halves, halves_of
 from panorama_stitch.turn.landmarks import clearest, everywhere, spread
-from panorama_stitch.turn.level_views import LevelViews, yaw_between
+from panorama_stitch.turn.level_views import LevelViews
+from panorama_stitch.turn.panorama_yaw import yaw_between
 from panorama_stitch.turn.sightings import Sightings, joined
 from panorama_stitch.turn.tracker import TurnTracker
 from panorama_stitch.turn.turn_state import TurnState
 
 _LEAST_CORNERS = 25
-_LOOKS = ((14, 0.8, 3), (4, 0.85, 2))
-"""How far each look at all pictures reaches, px; which correlation it asks for; and of how many
-landmarks each picture is asked for one."""
+_LOOKS = ((14, 0.8, 0.33), (6, 0.8, 0.5), (4, 0.85, 0.5))
+"""How far each look at all pictures reaches, px; which correlation it asks for; and what share of
+the landmarks each picture is asked for."""
 
 
 @dataclass(frozen=True)
@@ -79,10 +80,10 @@ def calibrate_turn(
     state, seen = _first(tracker, cameras, turns_right)
     fit = adjust(state, seen, sizes, yaws_known=False)
     state, seen, found_share = _with_yaws(fit.state, frames, brightest), fit.seen, 0.0
-    for reach_px, least, step in _LOOKS:
+    for reach_px, least, share in _LOOKS:
         reference = clearest(state, seen)
         views = LevelViews(frames, state, brightest)
-        wanted = everywhere(state, step)
+        wanted = everywhere(state, share)
         wanted = wanted.only(views.visible(wanted))
         found = views.find(wanted, reference, reach_px, least)
         found_share = len(found) / max(len(wanted), 1)

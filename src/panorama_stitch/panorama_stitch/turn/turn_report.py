@@ -48,7 +48,7 @@ class TurnReport:
         return tuple(
             LensAngles.of(
                 fit.state.lens(camera, size),
-                fit.covariance[_of(camera, INTRINSICS)] * halves.scale**2,
+                halves.scale**2 * fit.covariance[WIDTH * camera :, WIDTH * camera :][:8, :8],
                 tuple(half.lens(camera, size) for half in halves.states),
                 calibration.brightest[camera],
             )
@@ -186,7 +186,7 @@ class TurnReport:
             zip(calibration.cameras, mounts_of(state.attitudes), strict=True)
         ):
             angles = np.degrees([mount.yaw_rad, mount.pitch_rad, mount.roll_rad])
-            away = float(np.linalg.norm(state.places[camera]) * np.mean(state.nearness))
+            away = float(np.linalg.norm(state.places[camera]) * np.median(np.abs(state.nearness)))
             yield (
                 f'  {name:14} {angles[0]:8.2f} {angles[1]:8.2f} {angles[2]:8.2f}  vertical +- '
                 f'{self.vertical_deg(camera) / SIGMAS:.3f}; off the axis by {away:.1%} of the '
@@ -197,8 +197,3 @@ class TurnReport:
                 f'  {calibration.cameras[left]} to {calibration.cameras[right]} +- '
                 f'{self.rotation_deg(left, right) / SIGMAS:.3f}'
             )
-
-
-def _of(camera: int, names: tuple[str, ...]) -> tuple[slice, slice]:
-    part = slice(WIDTH * camera, WIDTH * camera + len(names))
-    return part, part
