@@ -24,8 +24,7 @@ from panorama_stitch.turn.turn_report import SIGMAS, TurnReport
 
 FOCAL_PERCENT, ANGLE_DEG, ROTATION_DEG, VERTICAL_DEG = 0.5, 0.3, 0.3, 0.3
 """The targets."""
-CASES = [(place, off_m) for off_m in (0.1, 0.2, 0.0) for place in PLACES]
-SHORT = CASES[:1]
+OFF_M = 0.0, 0.1, 0.2
 DISTORTIONS = {
     'measured': (0.02, -0.01, 0.003, -0.0008),
     'equisolid': (-1 / 24, 1 / 1920, -1 / 322560, 1 / 92897280),
@@ -143,6 +142,7 @@ def main() -> int:
     """Print the table; 1 if a target is missed."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('--short', action='store_true', help='one place only')
+    parser.add_argument('--off-m', type=float, nargs='+', default=OFF_M, help='from the axis')
     parser.add_argument('--width', type=int, default=640, help='of the pictures, px')
     parser.add_argument('--out', type=Path, default=Path('out'), help='where results go')
     options = parser.parse_args()
@@ -150,7 +150,8 @@ def main() -> int:
         'place     off, m  lens           focal, %  angle, deg   (told)  rotation  vertical  CPU'
     )
     results = []
-    for number, (place, off_m) in enumerate(SHORT if options.short else CASES):
+    cases = [(place, off_m) for off_m in options.off_m for place in PLACES]
+    for number, (place, off_m) in enumerate(cases[:1] if options.short else cases):
         kind = list(DISTORTIONS)[number % len(DISTORTIONS)]
         result = measure(place, off_m, kind, options.width)
         results.append(result)

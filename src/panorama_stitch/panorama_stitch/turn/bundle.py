@@ -115,10 +115,10 @@ class _Problem:
         sizes: Sequence[tuple[int, int]],
         free: np.ndarray,
         noise_px: float,
-        ahead: bool,
+        first: bool,
     ):
         self._seen, self._free, self._noise = seen, free, noise_px
-        self._expected = partial(expected, sizes=sizes, ahead=ahead)
+        self._expected = partial(expected, sizes=sizes, first=first)
 
     def solve(self, state: TurnState) -> tuple[TurnState, float]:
         """Return the state of least cost near another, and its cost.

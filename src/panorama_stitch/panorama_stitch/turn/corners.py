@@ -89,6 +89,8 @@ def followed(
     """
     if not len(points):
         return points, np.zeros(0, bool)
+    # A camera that changes its exposure must not look as if the scene changed.
+    after = cv2.convertScaleAbs(after, alpha=before.mean() / max(float(after.mean()), 1.0))
     options = {
         'winSize': (_WINDOW_PX, _WINDOW_PX),
         'maxLevel': _LEVELS,

@@ -26,6 +26,8 @@ _DEVIATIONS = {
 """Of the coefficients of real lenses and the places of cameras from 0."""
 _CENTER_DEVIATION_WIDTHS = 0.03
 _ASPECT_DEVIATION = 0.002
+_FIRST_HOLD = 20.0
+"""How much more both are held in a first estimate."""
 _BEHIND_DEVIATION = 0.1
 """Of a nearness below 0, which no thing has."""
 _QUARTILES_APART = 1.35
@@ -34,7 +36,7 @@ _LEAST_SPREAD = 1e-3
 
 
 def expected(
-    state: TurnState, sizes: Sequence[tuple[int, int]], *, ahead: bool
+    state: TurnState, sizes: Sequence[tuple[int, int]], *, first: bool
 ) -> tuple[np.ndarray, coo_matrix]:
     """Return how many deviations the unknowns are from what is expected, and the derivatives.
 
@@ -44,9 +46,10 @@ def expected(
         The unknowns.
     sizes
         Width and height of each camera's pictures, px.
-    ahead
-        Whether to hold landmarks ahead of infinity. It keeps a first estimate from taking what is
-        near for far and a place for its opposite, but is a bias where nearness is mostly noise.
+    first
+        Whether it is for a first estimate, far from the truth: pixels are square then, the axis is
+        near the middle, and landmarks are held ahead of infinity, lest what is near be taken for
+        far and a place for its opposite.
 
     Returns
     -------
@@ -55,6 +58,7 @@ def expected(
     slopes : coo_matrix
         (M, all unknowns) by what `TurnState.moved` changes.
     """
+    hold = _FIRST_HOLD if first else 1.0
     misses: list[float] = []
     slopes: list[float] = []
     rows: list[int] = []
@@ -63,31 +67,32 @@ def expected(
     def add(miss, **by):
         for name, slope in by.items():
             rows.append(len(misses))
-            columns.append(first + OF_CAMERA.index(name))
+            columns.append(begin + OF_CAMERA.index(name))
             slopes.append(slope)
         misses.append(miss)
 
     for camera, (lens, place, size) in enumerate(
         zip(state.lenses, state.places, sizes, strict=True)
     ):
-        first = WIDTH * camera
+        begin = WIDTH * camera
         for name, deviation in _DEVIATIONS.items():
             index = OF_CAMERA.index(name)
             value = lens[index] if index < len(lens) else place[index - WIDTH]
             add(value / deviation, **{name: 1 / deviation})
         focal_x, focal_y = lens[:2]
+        deviation = _ASPECT_DEVIATION / hold
         add(
-            (focal_x / focal_y - 1) / _ASPECT_DEVIATION,
-            focal_x_px=1 / focal_y / _ASPECT_DEVIATION,
-            focal_y_px=-focal_x / focal_y**2 / _ASPECT_DEVIATION,
+            (focal_x / focal_y - 1) / deviation,
+            focal_x_px=1 / focal_y / deviation,
+            focal_y_px=-focal_x / focal_y**2 / deviation,
         )
-        deviation = _CENTER_DEVIATION_WIDTHS * size[0]
+        deviation = _CENTER_DEVIATION_WIDTHS * size[0] / hold
         for name, value, side in zip(('center_x_px', 'center_y_px'), lens[2:4], size, strict=True):
             add((value - (side - 1) / 2) / deviation, **{name: 1 / deviation})
     landmarks = np.arange(len(state.nearness))
     # The mean of all landmarks is held as if each of them were by so little.
     each = np.full(len(landmarks), 1 / (_MEAN_DEVIATION * np.sqrt(max(len(landmarks), 1))))
-    behind = np.where(state.nearness < 0, float(ahead) / _BEHIND_DEVIATION, 0.0)
+    behind = np.where(state.nearness < 0, float(first) / _BEHIND_DEVIATION, 0.0)
     nearness = state.rig_count + 3 * landmarks + 2
     values = np.concatenate([slopes, each, behind])
     places = (

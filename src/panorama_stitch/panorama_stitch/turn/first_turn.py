@@ -1,7 +1,7 @@
 """A first estimate of a turn: each camera's focal length and axis, and the angle of each frame."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import brentq
@@ -87,7 +87,10 @@ def first_camera(
 
 
 def first_state(
-    cameras: Sequence[FirstCamera], seen: Sightings, turns_right: bool | None
+    cameras: Sequence[FirstCamera],
+    seen: Sightings,
+    turns_right: bool | None,
+    focal_share: float = 1.0,
 ) -> TurnState:
     """Put cameras together that turn as one, and the landmarks where they see them.
 
@@ -99,13 +102,15 @@ def first_state(
         What they saw.
     turns_right
         Which way the rig turned; None: the way in which most cameras are upright.
+    focal_share
+        Of the focal lengths: cameras that stand ahead of the axis make them look longer.
     """
     upright_share = sum(camera.axis[1] for camera in cameras)
     is_right = upright_share > 0 if turns_right is None else turns_right
     downs = [camera.axis if is_right else -camera.axis for camera in cameras]
     steps = [camera.turns @ down for camera, down in zip(cameras, downs, strict=True)]
     angles = np.concatenate([[0.0], np.cumsum(np.mean(steps, axis=0))])
-    lenses = [camera.lens for camera in cameras]
+    lenses = [_scaled(camera.lens, focal_share) for camera in cameras]
     attitudes = np.array([_upright(down) for down in downs])
     return TurnState(
         np.array(
@@ -141,6 +146,10 @@ def _lens(size: tuple[int, int], log_share: float) -> FisheyeLens:
     width, height = size
     focal = float(np.exp(log_share)) * width / np.pi
     return FisheyeLens(*size, focal, focal, (width - 1) / 2, (height - 1) / 2, (0.0,) * 4)
+
+
+def _scaled(lens: FisheyeLens, share: float) -> FisheyeLens:
+    return replace(lens, focal_x_px=lens.focal_x_px * share, focal_y_px=lens.focal_y_px * share)
 
 
 def _rotation(lens: FisheyeLens, before: np.ndarray, after: np.ndarray) -> np.ndarray:

@@ -20,6 +20,8 @@ from panorama_stitch.turn.tracker import TurnTracker
 from panorama_stitch.turn.turn_state import TurnState
 
 _LEAST_CORNERS = 25
+_SHARES = 1.0, 0.85
+"""Of the first focal lengths, from which the fit begins: one begin may end in a wrong valley."""
 _LOOKS = ((14, 0.8, 0.33), (6, 0.8, 0.5), (4, 0.85, 0.5))
 """How far each look at all pictures reaches, px; which correlation it asks for; and what share of
 the landmarks each picture is asked for."""
@@ -77,8 +79,9 @@ def calibrate_turn(
     frames = tracker.frames
     brightest = tuple(np.max(pictures, axis=0) for pictures in zip(*frames, strict=True))
     sizes = [picture.shape[::-1] for picture in brightest]
-    state, seen = _first(tracker, cameras, turns_right)
-    fit = adjust(state, seen, sizes, yaws_known=False)
+    starts = _starts(tracker, cameras, turns_right)
+    fits = [adjust(state, seen, sizes, yaws_known=False) for state, seen in starts]
+    fit = min(fits, key=lambda fit: fit.noise_px / len(fit.seen))
     state, seen, found_share = _with_yaws(fit.state, frames, brightest), fit.seen, 0.0
     for reach_px, least, share in _LOOKS:
         reference = clearest(state, seen)
@@ -92,10 +95,10 @@ def calibrate_turn(
     return TurnCalibration(tuple(cameras), fit, halves_of(fit, sizes), brightest, found_share)
 
 
-def _first(
+def _starts(
     tracker: TurnTracker, cameras: Sequence[str], turns_right: bool | None
-) -> tuple[TurnState, Sightings]:
-    """Return a first state, and the sightings of corners that were followed."""
+) -> list[tuple[TurnState, Sightings]]:
+    """Return states to begin with, and the sightings of corners that were followed."""
     frames, followed = tracker.frames, tracker.sightings()
     last = closing_frame(frames)
     firsts, links, number = [], [], followed.landmark.max() + 1
@@ -114,7 +117,7 @@ def _first(
             links += [(camera, late, ids, before), (camera, early, ids, after)]
             number += len(ids)
     seen = followed.and_(joined(links))
-    return spread(first_state(firsts, seen, turns_right), seen)
+    return [spread(first_state(firsts, seen, turns_right, share), seen) for share in _SHARES]
 
 
 def _steps(seen: Sightings, frames: int) -> list[tuple[np.ndarray, np.ndarray]]:
