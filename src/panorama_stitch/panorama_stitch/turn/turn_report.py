@@ -15,7 +15,6 @@ from panorama_stitch.turn.turn_calibration import TurnCalibration
 from panorama_stitch.turn.turn_state import OF_CAMERA, WIDTH
 
 SIGMAS = 2.0
-"""What is called uncertain by so much is right within it in 19 of 20 cases."""
 _MAX_ANGLE_DEG = 0.3
 _MAX_FOCAL = 0.005
 _MAX_ROTATION_DEG = 0.3
@@ -23,6 +22,8 @@ _MAX_NOISE_WIDTHS = 1 / 800
 _MIN_REACH = 0.85
 """Share of the angle at the picture's edge up to which landmarks must have been seen."""
 _MIN_FOUND = 0.4
+_MAX_OFF_AXIS = 0.1
+"""Of the usual distance: beyond it near things look too different from place to place."""
 _MIN_SHARED = 100
 """Landmarks that a camera must have in common with others."""
 _TURNS = [OF_CAMERA.index(f'turn_{axis}') for axis in 'xyz']
@@ -112,6 +113,8 @@ class TurnReport:
         for camera, name in enumerate(calibration.cameras):
             if not (told := self.vertical_deg(camera)) <= _MAX_ROTATION_DEG:
                 yield f'the vertical of {name} is uncertain by {told:.2f} degrees'
+            if (away := self._off_axis(camera)) > _MAX_OFF_AXIS:
+                yield f'{name} is off the axis by {away:.0%} of the usual distance: turn elsewhere'
         for left, right in pairwise(range(len(calibration.cameras))):
             if not (told := self.rotation_deg(left, right)) <= _MAX_ROTATION_DEG:
                 yield (
@@ -123,6 +126,10 @@ class TurnReport:
                 f'only {calibration.found_share:.0%} of the landmarks were found again where they '
                 'should be: too much moved, or hid behind other things'
             )
+
+    def _off_axis(self, camera: int) -> float:
+        state = self.calibration.fit.state
+        return float(np.linalg.norm(state.places[camera]) * np.median(np.abs(state.nearness)))
 
     def _reach_deg(self, camera: int) -> float:
         fit = self.calibration.fit
@@ -186,7 +193,7 @@ class TurnReport:
             zip(calibration.cameras, mounts_of(state.attitudes), strict=True)
         ):
             angles = np.degrees([mount.yaw_rad, mount.pitch_rad, mount.roll_rad])
-            away = float(np.linalg.norm(state.places[camera]) * np.median(np.abs(state.nearness)))
+            away = self._off_axis(camera)
             yield (
                 f'  {name:14} {angles[0]:8.2f} {angles[1]:8.2f} {angles[2]:8.2f}  vertical +- '
                 f'{self.vertical_deg(camera) / SIGMAS:.3f}; off the axis by {away:.1%} of the '
