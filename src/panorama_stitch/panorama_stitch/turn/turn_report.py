@@ -31,13 +31,7 @@ _TURNS = [OF_CAMERA.index(f'turn_{axis}') for axis in 'xyz']
 
 @dataclass(frozen=True)
 class TurnReport:
-    """Figures of a calibration from a turn.
-
-    Attributes
-    ----------
-    calibration
-        What is reported on.
-    """
+    """Figures of a calibration from a turn."""
 
     calibration: TurnCalibration
 
@@ -113,7 +107,7 @@ class TurnReport:
         for camera, name in enumerate(calibration.cameras):
             if not (told := self.vertical_deg(camera)) <= _MAX_ROTATION_DEG:
                 yield f'the vertical of {name} is uncertain by {told:.2f} degrees'
-            if (away := self._off_axis(camera)) > _MAX_OFF_AXIS:
+            if (away := calibration.fit.state.off_axis(camera)) > _MAX_OFF_AXIS:
                 yield f'{name} is off the axis by {away:.0%} of the usual distance: turn elsewhere'
         for left, right in pairwise(range(len(calibration.cameras))):
             if not (told := self.rotation_deg(left, right)) <= _MAX_ROTATION_DEG:
@@ -127,10 +121,6 @@ class TurnReport:
                 'should be: too much moved, or hid behind other things'
             )
 
-    def _off_axis(self, camera: int) -> float:
-        state = self.calibration.fit.state
-        return float(np.linalg.norm(state.places[camera]) * np.median(np.abs(state.nearness)))
-
     def _reach_deg(self, camera: int) -> float:
         fit = self.calibration.fit
         x, y, z = fit.state.rays(fit.seen.only(fit.seen.camera == camera)).T
@@ -143,7 +133,7 @@ class TurnReport:
 
     @property
     def good(self) -> bool:
-        """Whether nothing speaks against using the calibration."""
+        """Whether there are no doubts."""
         return not self.doubts
 
     @property
@@ -193,11 +183,10 @@ class TurnReport:
             zip(calibration.cameras, mounts_of(state.attitudes), strict=True)
         ):
             angles = np.degrees([mount.yaw_rad, mount.pitch_rad, mount.roll_rad])
-            away = self._off_axis(camera)
+            sigma, away = self.vertical_deg(camera) / SIGMAS, state.off_axis(camera)
             yield (
                 f'  {name:14} {angles[0]:8.2f} {angles[1]:8.2f} {angles[2]:8.2f}  vertical +- '
-                f'{self.vertical_deg(camera) / SIGMAS:.3f}; off the axis by {away:.1%} of the '
-                'usual distance'
+                f'{sigma:.3f}; off the axis by {away:.1%} of the usual distance'
             )
         for left, right in pairwise(range(len(calibration.cameras))):
             yield (

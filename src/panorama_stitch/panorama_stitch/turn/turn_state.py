@@ -58,6 +58,10 @@ class TurnState:
         """Number of the unknowns that are not of landmarks."""
         return WIDTH * len(self.lenses) + len(self.angles)
 
+    def off_axis(self, camera: int) -> float:
+        """Return how far a camera is off the axis, in usual distances of landmarks."""
+        return float(np.linalg.norm(self.places[camera]) * np.median(np.abs(self.nearness)))
+
     def moved(self, step: np.ndarray) -> 'TurnState':
         """Return the state after a step in all unknowns: cameras, angles, landmarks."""
         cameras, angles, landmarks = np.split(step, [WIDTH * len(self.lenses), self.rig_count])
