@@ -15,10 +15,10 @@ from matplotlib.figure import Figure
 from rendered_view import render_view, scattered_poses
 
 from fisheye_geometry.lens import FisheyeLens
-from fisheye_undistort.calibration import calibrate
-from fisheye_undistort.detection import Detector
-from fisheye_undistort.estimate import TargetView
-from fisheye_undistort.target import STANDARD, Target
+from fisheye_undistort.detect.detection import Detector
+from fisheye_undistort.fit.calibration import calibrate
+from fisheye_undistort.fit.estimate import TargetView
+from fisheye_undistort.target.target import STANDARD, Target
 
 VIEWS = 12
 REPEATS = 5

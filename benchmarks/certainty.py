@@ -13,13 +13,13 @@ from rendered_view import facing_pose, render_view
 from fisheye_core.errors import FisheyeError
 from fisheye_geometry.lens import Lens
 from fisheye_testing.data import real_data
-from fisheye_undistort.angle_map import lit_part
-from fisheye_undistort.calibration import calibrate
-from fisheye_undistort.detection import Detector
-from fisheye_undistort.gathering import gather
-from fisheye_undistort.pictures import NamedPicture, read_pictures
-from fisheye_undistort.report import CalibrationReport
-from fisheye_undistort.target import STANDARD, TAGS, Target
+from fisheye_undistort.detect.detection import Detector
+from fisheye_undistort.detect.gathering import gather
+from fisheye_undistort.detect.pictures import NamedPicture, read_pictures
+from fisheye_undistort.fit.angle_map import lit_part
+from fisheye_undistort.fit.calibration import calibrate
+from fisheye_undistort.report.report import CalibrationReport
+from fisheye_undistort.target.target import STANDARD, TAGS, Target
 
 LENSES = ('equisolid', 'stereographic', 'double_sphere', 'ocam')
 FIELDS_DEG = (120, 160, 190, 220)

@@ -1,4 +1,4 @@
-from setuptools import setup
+from setuptools import find_packages, setup
 
 package_name = 'fisheye_undistort'
 
@@ -9,7 +9,7 @@ setup(
     maintainer_email='maintainers@fisheye-panorama.example',
     description='Calibration of fisheye lenses, and the correction of their distortion.',
     license='Apache-2.0',
-    packages=[package_name],
+    packages=find_packages(include=[f'{package_name}*']),
     package_data={package_name: ['py.typed']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),

@@ -7,19 +7,19 @@ from pathlib import Path
 
 from fisheye_core.errors import FisheyeError, SettingError
 from fisheye_geometry.camera_file import Camera, read_camera
-from fisheye_undistort.angle_map import lit_part
 from fisheye_undistort.calibrate_options import make_parser, target_of
-from fisheye_undistort.calibrated_angle import report_path
-from fisheye_undistort.calibration import calibrate
-from fisheye_undistort.collector import Collector
-from fisheye_undistort.conversion import convert
-from fisheye_undistort.detection import Detector
-from fisheye_undistort.gathering import Gathered, gather
-from fisheye_undistort.lens_difference import LensDifference
-from fisheye_undistort.pictures import read_pictures
-from fisheye_undistort.report import CalibrationReport
-from fisheye_undistort.report_file import calibrated_line, write_report
-from fisheye_undistort.written_formats import write_as
+from fisheye_undistort.detect.collector import Collector
+from fisheye_undistort.detect.detection import Detector
+from fisheye_undistort.detect.gathering import Gathered, gather
+from fisheye_undistort.detect.pictures import read_pictures
+from fisheye_undistort.fit.angle_map import lit_part
+from fisheye_undistort.fit.calibration import calibrate
+from fisheye_undistort.foreign.conversion import convert
+from fisheye_undistort.foreign.written_formats import write_as
+from fisheye_undistort.report.calibrated_angle import report_path
+from fisheye_undistort.report.lens_difference import LensDifference
+from fisheye_undistort.report.report import CalibrationReport
+from fisheye_undistort.report.report_file import calibrated_line, write_report
 
 GOOD, FAILED, POOR = 0, 1, 2
 _INTERRUPTED = 130
@@ -42,7 +42,7 @@ def _run(options: argparse.Namespace) -> int:
     if not 0 <= options.seam_deg < 180:
         raise SettingError(f'--seam-deg is {options.seam_deg:g}; expected 0 to 180 degrees')
     if options.plot:
-        from fisheye_undistort.report_plot import check_plot
+        from fisheye_undistort.report.report_plot import check_plot
 
         check_plot(options.plot)
     for name, action in _ACTIONS.items():
@@ -52,7 +52,7 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _print(options: argparse.Namespace) -> int:
-    from fisheye_undistort.target_sheet import write_sheet
+    from fisheye_undistort.target.target_sheet import write_sheet
 
     target = target_of(options)
     print(f'{options.print}: {target}, on {write_sheet(options.print, target)}')
@@ -64,7 +64,7 @@ def _compare(options: argparse.Namespace) -> int:
     difference = LensDifference(one, other)
     print(difference)
     if options.plot:
-        from fisheye_undistort.difference_plot import plot_difference
+        from fisheye_undistort.report.difference_plot import plot_difference
 
         plot_difference(options.plot, difference)
     return GOOD
@@ -126,7 +126,7 @@ def _calibrate(options: argparse.Namespace) -> int:
         print(f'note     {gathered.note}')
     print(f'{report}\nwritten  {output}, {report_path(output).name}')
     if options.plot:
-        from fisheye_undistort.report_plot import plot_report
+        from fisheye_undistort.report.report_plot import plot_report
 
         plot_report(options.plot, report, collector.example)
     return GOOD if report.good else POOR

@@ -5,9 +5,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from fisheye_core.errors import SettingError
-from fisheye_undistort.pictures import HALVES
-from fisheye_undistort.target import KINDS, MARKERS, STANDARD, Target
-from fisheye_undistort.written_formats import FORMATS
+from fisheye_undistort.detect.pictures import HALVES
+from fisheye_undistort.foreign.written_formats import FORMATS
+from fisheye_undistort.target.target import KINDS, MARKERS, STANDARD, Target
 
 _SEAM = (
     'angle from the axis at which a seam of the panorama lies: the verdict asks for no more '

@@ -9,8 +9,8 @@ from fisheye_bridge.running import spin_until, started
 from fisheye_bridge.topics import ImageSubscription
 from fisheye_core.encodings import converted
 from fisheye_core.errors import SettingError, SourceError
-from fisheye_undistort.collector import Collector
-from fisheye_undistort.pictures import NamedPicture, cut
+from fisheye_undistort.detect.collector import Collector
+from fisheye_undistort.detect.pictures import NamedPicture, cut
 
 _LONGEST_WAIT_S = 10.0
 """Without a picture for so long there is nobody to wait for."""

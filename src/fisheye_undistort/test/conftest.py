@@ -8,8 +8,8 @@ from rendered_view import render_view, scattered_poses
 
 from fisheye_geometry.lens import FisheyeLens
 from fisheye_testing.data import real_data
-from fisheye_undistort.estimate import TargetView
-from fisheye_undistort.target import STANDARD
+from fisheye_undistort.fit.estimate import TargetView
+from fisheye_undistort.target.target import STANDARD
 
 
 def fisheye(fov_deg: int, scale: int = 1) -> FisheyeLens:

@@ -8,8 +8,8 @@ import numpy as np
 
 from fisheye_core.errors import GeometryError
 from fisheye_geometry.lens import Lens
-from fisheye_undistort.target import Target
-from fisheye_undistort.target_sheet import sheet_picture
+from fisheye_undistort.target.target import Target
+from fisheye_undistort.target.target_sheet import sheet_picture
 
 _SHEET_PX_PER_MM = 4.0
 _SUBPIXELS = 3

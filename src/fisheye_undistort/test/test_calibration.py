@@ -9,15 +9,15 @@ from rendered_view import facing_pose, render_view, scattered_poses
 
 from fisheye_core.errors import CalibrationError
 from fisheye_geometry.lens_surface import surface_for
-from fisheye_undistort.calibration import calibrate
-from fisheye_undistort.circle_bias import center_bias
-from fisheye_undistort.detection import Detector
-from fisheye_undistort.estimate import Estimate, TargetView
-from fisheye_undistort.misfit import misfit_of
-from fisheye_undistort.pictures import read_pictures
-from fisheye_undistort.sheet_model import warp_board
-from fisheye_undistort.target import STANDARD, Target
-from fisheye_undistort.turned_views import turned
+from fisheye_undistort.detect.detection import Detector
+from fisheye_undistort.detect.pictures import read_pictures
+from fisheye_undistort.fit.calibration import calibrate
+from fisheye_undistort.fit.circle_bias import center_bias
+from fisheye_undistort.fit.estimate import Estimate, TargetView
+from fisheye_undistort.fit.sheet_model import warp_board
+from fisheye_undistort.fit.turned_views import turned
+from fisheye_undistort.report.misfit import misfit_of
+from fisheye_undistort.target.target import STANDARD, Target
 
 PAPER = STANDARD['circles']
 DENSE = Target('circles', 7, 10, 25, 25, radius_mm=9)

@@ -5,9 +5,9 @@ from conftest import fisheye
 from rendered_view import Look, facing_pose, render_view
 
 from fisheye_core.errors import ImageFormatError, SettingError
-from fisheye_undistort.circle_grid import area_bands, find_circles
-from fisheye_undistort.grid_order import order_grid
-from fisheye_undistort.target import STANDARD
+from fisheye_undistort.detect.circle_grid import area_bands, find_circles
+from fisheye_undistort.detect.grid_order import order_grid
+from fisheye_undistort.target.target import STANDARD
 
 CENTER_PX = 0.02
 """A hundredth of the edge's width: what 2 grey levels of noise leave."""

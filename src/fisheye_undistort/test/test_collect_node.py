@@ -10,9 +10,9 @@ from fisheye_core.errors import SettingError, SourceError
 from fisheye_testing.image_message import to_message
 from fisheye_undistort import collect_node
 from fisheye_undistort.collect_node import collect
-from fisheye_undistort.collector import Collector
-from fisheye_undistort.detection import Detector
-from fisheye_undistort.target import STANDARD
+from fisheye_undistort.detect.collector import Collector
+from fisheye_undistort.detect.detection import Detector
+from fisheye_undistort.target.target import STANDARD
 
 VIEWS = 4
 TOPIC = '/collect_node_test/image_raw'

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from fisheye_core.errors import CalibrationError, ImageFormatError
-from fisheye_undistort.collector import Collector
-from fisheye_undistort.estimate import TargetView
-from fisheye_undistort.pictures import NamedPicture
+from fisheye_undistort.detect.collector import Collector
+from fisheye_undistort.detect.pictures import NamedPicture
+from fisheye_undistort.fit.estimate import TargetView
 
 GRID = np.stack(np.meshgrid(np.arange(3), np.arange(3)), axis=-1).reshape(-1, 2) * 40.0
 SIZE = (640, 480)

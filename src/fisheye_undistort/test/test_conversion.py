@@ -7,9 +7,9 @@ from foreign_lenses import foreign_lens
 
 from fisheye_core.errors import CameraFileError, FisheyeError
 from fisheye_geometry.camera_file import Camera, read_camera
-from fisheye_undistort.conversion import convert
-from fisheye_undistort.lens_difference import LensDifference
-from fisheye_undistort.written_formats import FORMATS, write_as
+from fisheye_undistort.foreign.conversion import convert
+from fisheye_undistort.foreign.written_formats import FORMATS, write_as
+from fisheye_undistort.report.lens_difference import LensDifference
 
 CLOSE_DEG = 0.05
 """Four coefficients follow other models that well."""

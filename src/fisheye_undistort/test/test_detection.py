@@ -5,9 +5,9 @@ from foreign_lenses import foreign_lens
 from rendered_view import Look, facing_pose, render_view, scattered_poses
 
 from fisheye_core.errors import CalibrationError
-from fisheye_undistort.calibration import calibrate
-from fisheye_undistort.detection import Detector
-from fisheye_undistort.target import STANDARD, TAGS, Target
+from fisheye_undistort.detect.detection import Detector
+from fisheye_undistort.fit.calibration import calibrate
+from fisheye_undistort.target.target import STANDARD, TAGS, Target
 
 CORNER_PX = 0.25
 """Corners of squares are blurred by the lens and placed by what is around them."""

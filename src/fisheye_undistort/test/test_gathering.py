@@ -8,10 +8,10 @@ from foreign_lenses import foreign_lens
 from rendered_view import Look, facing_pose, render_view, scattered_poses
 
 from fisheye_core.errors import CalibrationError
-from fisheye_undistort.detection import Detector
-from fisheye_undistort.gathering import gather
-from fisheye_undistort.pictures import NamedPicture
-from fisheye_undistort.target import STANDARD, Target
+from fisheye_undistort.detect.detection import Detector
+from fisheye_undistort.detect.gathering import gather
+from fisheye_undistort.detect.pictures import NamedPicture
+from fisheye_undistort.target.target import STANDARD, Target
 
 LENS = foreign_lens('equisolid', 180)
 BOARD = STANDARD['chessboard']

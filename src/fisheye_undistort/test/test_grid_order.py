@@ -6,9 +6,9 @@ from conftest import fisheye
 from rendered_view import facing_pose, scattered_poses
 
 from fisheye_core.errors import CalibrationError
-from fisheye_undistort.circle_grid import Circles, find_circles
-from fisheye_undistort.grid_order import order_grid
-from fisheye_undistort.target import STANDARD, Target
+from fisheye_undistort.detect.circle_grid import Circles, find_circles
+from fisheye_undistort.detect.grid_order import order_grid
+from fisheye_undistort.target.target import STANDARD, Target
 
 NEAR_PX = 6.0
 """A neighbour is farther; a large circle's centre of mass is not."""

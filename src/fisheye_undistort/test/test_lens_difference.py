@@ -5,8 +5,8 @@ import pytest
 from conftest import fisheye
 
 from fisheye_core.errors import SettingError
-from fisheye_undistort.difference_plot import plot_difference
-from fisheye_undistort.lens_difference import LensDifference
+from fisheye_undistort.report.difference_plot import plot_difference
+from fisheye_undistort.report.lens_difference import LensDifference
 
 LENS = fisheye(170)
 

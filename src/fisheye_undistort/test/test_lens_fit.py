@@ -4,12 +4,12 @@ import pytest
 from conftest import seen_exactly
 from rendered_view import scattered_poses
 
-from fisheye_undistort.estimate import Estimate, TargetView
-from fisheye_undistort.first_guess import first_guess
-from fisheye_undistort.lens_fit import GROUPS, FitProblem, damp, fit
-from fisheye_undistort.lens_prior import usual_lens
-from fisheye_undistort.sheet_model import UNKNOWNS, lens_of, project, warp_board
-from fisheye_undistort.target import Target
+from fisheye_undistort.fit.estimate import Estimate, TargetView
+from fisheye_undistort.fit.first_guess import first_guess
+from fisheye_undistort.fit.lens_fit import GROUPS, FitProblem, damp, fit
+from fisheye_undistort.fit.lens_prior import usual_lens
+from fisheye_undistort.fit.sheet_model import UNKNOWNS, lens_of, project, warp_board
+from fisheye_undistort.target.target import Target
 
 TARGET = Target('circles', 4, 5, 40, 40, radius_mm=15)
 UNKNOWN_TRUTH = np.array([215, 216, 322, 238, 0.02, -0.01, 0.003, -0.0008, 1.5, -0.5, 0.8])

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from fisheye_undistort.lens_prior import assumed_deviations, usual_distortion, usual_lens
-from fisheye_undistort.sheet_model import UNKNOWNS
-from fisheye_undistort.target import STANDARD
+from fisheye_undistort.fit.lens_prior import assumed_deviations, usual_distortion, usual_lens
+from fisheye_undistort.fit.sheet_model import UNKNOWNS
+from fisheye_undistort.target.target import STANDARD
 
 ANGLES = np.radians(np.arange(1.0, 91.0))
 SIZE = (640, 480)

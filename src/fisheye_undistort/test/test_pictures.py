@@ -6,7 +6,7 @@ import pytest
 
 from fisheye_core.errors import SourceError
 from fisheye_testing.odd_pictures import huge_png, turned
-from fisheye_undistort.pictures import read_pictures
+from fisheye_undistort.detect.pictures import read_pictures
 
 HEIC = b'\0\0\0\x18ftypheic\0\0\0\0mif1heic'
 FLOAT = cv2.imencode('.tif', np.linspace(0, 1, 48, dtype=np.float32).reshape(6, 8))[1].tobytes()

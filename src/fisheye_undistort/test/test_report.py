@@ -7,14 +7,14 @@ from conftest import seen_exactly
 from rendered_view import facing_pose, scattered_poses
 
 from fisheye_core.errors import FileAccessError
-from fisheye_undistort.angle_map import lit_part
-from fisheye_undistort.calibrated_angle import calibrated_deg, report_path
-from fisheye_undistort.calibration import calibrate
-from fisheye_undistort.estimate import TargetView
-from fisheye_undistort.report import CalibrationReport
-from fisheye_undistort.report_file import calibrated_line, write_report
-from fisheye_undistort.report_plot import plot_report
-from fisheye_undistort.target import Target
+from fisheye_undistort.fit.angle_map import lit_part
+from fisheye_undistort.fit.calibration import calibrate
+from fisheye_undistort.fit.estimate import TargetView
+from fisheye_undistort.report.calibrated_angle import calibrated_deg, report_path
+from fisheye_undistort.report.report import CalibrationReport
+from fisheye_undistort.report.report_file import calibrated_line, write_report
+from fisheye_undistort.report.report_plot import plot_report
+from fisheye_undistort.target.target import Target
 
 BOARD = Target('chessboard', 7, 10, 25, 25)
 SIZE = (640, 480)

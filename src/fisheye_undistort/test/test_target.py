@@ -3,8 +3,8 @@ import numpy as np
 import pytest
 
 from fisheye_core.errors import SettingError
-from fisheye_undistort.marker_dictionary import dictionary_named
-from fisheye_undistort.target import KINDS, MARKERS, STANDARD, Target
+from fisheye_undistort.target.marker_dictionary import dictionary_named
+from fisheye_undistort.target.target import KINDS, MARKERS, STANDARD, Target
 
 
 def test_every_kind_has_a_standard_sheet():

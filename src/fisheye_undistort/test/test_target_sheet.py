@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from fisheye_core.errors import FileAccessError, SettingError
-from fisheye_undistort.detection import Detector
-from fisheye_undistort.target import KINDS, STANDARD, Target
-from fisheye_undistort.target_sheet import paper_for, sheet_picture, write_sheet
+from fisheye_undistort.detect.detection import Detector
+from fisheye_undistort.target.target import KINDS, STANDARD, Target
+from fisheye_undistort.target.target_sheet import paper_for, sheet_picture, write_sheet
 
 PX_PER_MM = 6.0
 PRINTED_MM = 0.02

@@ -18,7 +18,7 @@ from fisheye_core.errors import CameraFileError, FisheyeError
 from fisheye_geometry.camera import Camera
 from fisheye_geometry.image_circle import LensWithImageCircle
 from fisheye_geometry.lens import Lens
-from fisheye_undistort.calibrated_angle import calibrated_deg
+from fisheye_undistort.report.calibrated_angle import calibrated_deg
 from panorama_stitch.compose.seam_angle import seam_angle_rad
 from panorama_stitch.nodes.base_node import PanoramaBase
 from panorama_stitch.nodes.frame_reader import TOPIC, Reader, reader_for

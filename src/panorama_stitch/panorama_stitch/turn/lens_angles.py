@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from fisheye_geometry.lens import FisheyeLens
-from fisheye_undistort.sheet_model import project
+from fisheye_undistort.fit.sheet_model import project
 
 _COLUMNS, _ROWS = 33, 25
 _DARK_LEVEL = 16

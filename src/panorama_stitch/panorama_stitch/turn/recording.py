@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from fisheye_core.errors import SourceError
-from fisheye_undistort.pictures import NamedPicture, read_pictures
+from fisheye_undistort.detect.pictures import NamedPicture, read_pictures
 
 _END = object()
 

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from fisheye_geometry.attitude import angle_between
-from fisheye_undistort.sheet_model import INTRINSICS
+from fisheye_undistort.fit.sheet_model import INTRINSICS
 from panorama_stitch.turn.lens_angles import LensAngles
 from panorama_stitch.turn.rig_files import mounts_of
 from panorama_stitch.turn.turn_calibration import TurnCalibration

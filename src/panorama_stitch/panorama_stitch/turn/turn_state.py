@@ -12,7 +12,7 @@ import numpy as np
 
 from fisheye_geometry.attitude import rotation_matrix
 from fisheye_geometry.lens import FisheyeLens
-from fisheye_undistort.sheet_model import INTRINSICS, lens_of, project
+from fisheye_undistort.fit.sheet_model import INTRINSICS, lens_of, project
 from panorama_stitch.turn.sightings import Sightings
 
 OF_CAMERA = (*INTRINSICS, 'turn_x', 'turn_y', 'turn_z', 'place_x', 'place_y', 'place_z')

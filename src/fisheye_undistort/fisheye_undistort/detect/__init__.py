@@ -1,0 +1,1 @@
+"""From pictures to views of a target: begin with `gathering`, then `detection`."""

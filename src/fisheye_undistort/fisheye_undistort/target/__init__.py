@@ -1,0 +1,1 @@
+"""What is printed and shown to a camera: begin with `target`."""
