@@ -5,7 +5,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from fisheye_core.errors import FisheyeError, SettingError
+from fisheye_core.command_line import exit_code
+from fisheye_core.errors import SettingError
 from fisheye_geometry.camera_file import Camera, read_camera
 from fisheye_undistort.calibrate_options import make_parser, target_of
 from fisheye_undistort.detect.collector import Collector
@@ -21,19 +22,12 @@ from fisheye_undistort.report.lens_difference import LensDifference
 from fisheye_undistort.report.report import CalibrationReport
 from fisheye_undistort.report.report_file import calibrated_line, write_report
 
-GOOD, FAILED, POOR = 0, 1, 2
-_INTERRUPTED = 130
+GOOD, POOR = 0, 2
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; give its exit code: 0 good, 2 poor but written, 1 failed."""
-    try:
-        return _run(make_parser(__doc__).parse_args(arguments))
-    except FisheyeError as error:
-        print(f'calibrate_lens: {error}', file=sys.stderr)
-        return FAILED
-    except KeyboardInterrupt:
-        return _INTERRUPTED
+    return exit_code('calibrate_lens', lambda: _run(make_parser(__doc__).parse_args(arguments)))
 
 
 def _run(options: argparse.Namespace) -> int:

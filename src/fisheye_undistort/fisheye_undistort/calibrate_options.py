@@ -4,7 +4,7 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from fisheye_core.errors import SettingError
+from fisheye_core.command_line import CommandParser
 from fisheye_undistort.detect.pictures import HALVES
 from fisheye_undistort.foreign.written_formats import FORMATS
 from fisheye_undistort.target.target import KINDS, MARKERS, STANDARD, Target
@@ -15,14 +15,9 @@ _SEAM = (
 )
 
 
-class _Parser(argparse.ArgumentParser):
-    def error(self, message):
-        raise SettingError(f'{message} (see {self.prog} --help)')
-
-
 def make_parser(description: str | None) -> argparse.ArgumentParser:
     """Return the parser of the command line."""
-    parser = _Parser(
+    parser = CommandParser(
         prog='calibrate_lens',
         description=description,
         epilog='Exit code: 0 good, 2 poor but written, 1 failed (with the reason).',

@@ -6,8 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
+from fisheye_core.command_line import FAILED
 from fisheye_geometry.camera_file import read_camera
-from fisheye_undistort.calibrate_lens import FAILED, GOOD, POOR, main
+from fisheye_undistort.calibrate_lens import GOOD, POOR, main
 
 FOCAL = 0.003
 

@@ -14,11 +14,12 @@ from turning import MOUNTS_DEG, turn_pictures, turning_lens
 
 from fisheye_bridge.qos import IMAGE
 from fisheye_bridge.stamps import stamp_of
+from fisheye_core.command_line import FAILED
 from fisheye_core.errors import SourceError
 from fisheye_geometry.camera_file import read_camera
 from fisheye_testing.image_message import to_message
 from panorama_stitch.turn import record_node
-from panorama_stitch.turn.calibrate_rig import FAILED, GOOD, main
+from panorama_stitch.turn.calibrate_rig import GOOD, main
 from panorama_stitch.turn.record_node import record
 from panorama_stitch.turn.tracker import TurnTracker
 

@@ -76,7 +76,7 @@ def adjust(
     free = _free(state, yaws_known)
     cost = np.inf
     for _ in range(_ROUNDS):
-        state, now = _Problem(seen, sizes, free, noise_px, not yaws_known).solve(state)
+        state, now = _TurnProblem(seen, sizes, free, noise_px, not yaws_known).solve(state)
         residuals = seen.pixels - state.predict(seen)
         noise_px = max(1.4826 * float(np.median(np.abs(residuals))), _LEAST_NOISE_PX)
         good = np.linalg.norm(residuals, axis=1) < _OUTLIER * noise_px
@@ -85,7 +85,7 @@ def adjust(
         cost = now if good.all() else np.inf
         state, seen = _without_rare(state, seen.only(good))
         free = _free(state, yaws_known)
-    covariance = _Problem(seen, sizes, free, noise_px, not yaws_known).covariance(state)
+    covariance = _TurnProblem(seen, sizes, free, noise_px, not yaws_known).covariance(state)
     return TurnFit(state, seen, covariance, noise_px)
 
 
@@ -106,7 +106,7 @@ def _without_rare(state: TurnState, seen: Sightings) -> tuple[TurnState, Sightin
     return only(state, seen, counts >= _LEAST_SIGHTINGS)
 
 
-class _Problem:
+class _TurnProblem:
     """Residuals and derivatives of a state, in units of deviations."""
 
     def __init__(

@@ -5,7 +5,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from fisheye_core.errors import FileAccessError, FisheyeError, SettingError
+from fisheye_core.command_line import CommandParser, exit_code
+from fisheye_core.errors import FileAccessError, SettingError
 from fisheye_geometry.rig import CAMERA_NAME, MAX_CAMERAS
 from panorama_stitch.turn.recording import read_recording
 from panorama_stitch.turn.rig_files import PARAMETERS, write_rig
@@ -13,29 +14,17 @@ from panorama_stitch.turn.tracker import TurnTracker
 from panorama_stitch.turn.turn_calibration import calibrate_turn
 from panorama_stitch.turn.turn_report import TurnReport
 
-GOOD, FAILED, POOR = 0, 1, 2
-_INTERRUPTED = 130
+GOOD, POOR = 0, 2
 _WAYS = {'auto': None, 'right': True, 'left': False}
-
-
-class _Parser(argparse.ArgumentParser):
-    def error(self, message):
-        raise SettingError(f'{message} (see {self.prog} --help)')
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; give its exit code: 0 good, 2 poor but written, 1 failed."""
-    try:
-        return _run(_parser().parse_args(arguments))
-    except FisheyeError as error:
-        print(f'calibrate_rig: {error}', file=sys.stderr)
-        return FAILED
-    except KeyboardInterrupt:
-        return _INTERRUPTED
+    return exit_code('calibrate_rig', lambda: _run(_parser().parse_args(arguments)))
 
 
-def _parser() -> _Parser:
-    parser = _Parser(
+def _parser() -> CommandParser:
+    parser = CommandParser(
         prog='calibrate_rig',
         description=__doc__,
         epilog='Exit code: 0 good, 2 poor but written, 1 failed (with the reason).',

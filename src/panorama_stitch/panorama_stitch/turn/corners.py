@@ -47,7 +47,7 @@ class Corners:
         return float(np.percentile(moved, 75)) if len(moved) else 0.0
 
     def settle(self) -> int:
-        """Take the corners where they were found; return how many are left."""
+        """Move the corners to where they were found; return how many are left."""
         moved = np.linalg.norm(self._guess - self.points, axis=1)
         kept = self._good & (moved > _STILL_PX)
         self._still = self.points[self._good & ~kept]

@@ -15,7 +15,7 @@ _SECTOR_RAD = np.radians(20)
 
 
 @dataclass(frozen=True)
-class Halves:
+class TurnHalves:
     """Two fits.
 
     Attributes
@@ -30,7 +30,7 @@ class Halves:
     scale: float
 
 
-def halves_of(fit: TurnFit, sizes: Sequence[tuple[int, int]]) -> Halves:
+def halves_of(fit: TurnFit, sizes: Sequence[tuple[int, int]]) -> TurnHalves:
     """Fit either half of the landmarks, beginning with what fits all of them."""
     x, _, z = fit.state.directions.T
     is_odd = (np.arctan2(x, z) // _SECTOR_RAD).astype(int) % 2 == 1
@@ -44,7 +44,7 @@ def halves_of(fit: TurnFit, sizes: Sequence[tuple[int, int]]) -> Halves:
     variance = np.diag(covariance)[: apart.size].reshape(apart.shape)
     # The places are known but for a factor, which differs.
     known = (variance > 0) & np.array([not name.startswith('place') for name in OF_CAMERA])
-    return Halves((one, other), max(1.0, _rms(apart[known] / np.sqrt(variance[known]))))
+    return TurnHalves((one, other), max(1.0, _rms(apart[known] / np.sqrt(variance[known]))))
 
 
 def _apart(one: TurnState, other: TurnState) -> np.ndarray:

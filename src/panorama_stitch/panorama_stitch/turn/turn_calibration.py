@@ -11,7 +11,7 @@ from fisheye_geometry.attitude import Attitude
 from panorama_stitch.turn.bundle import TurnFit, adjust
 from panorama_stitch.turn.first_turn import first_camera, first_state
 from panorama_stitch.turn.full_circle import Frame, closing_frame, seen_again
-from panorama_stitch.turn.halves import Halves, halves_of
+from panorama_stitch.turn.halves import TurnHalves, halves_of
 from panorama_stitch.turn.landmarks import clearest, everywhere, spread
 from panorama_stitch.turn.level_views import LevelViews
 from panorama_stitch.turn.panorama_yaw import yaw_between
@@ -47,7 +47,7 @@ class TurnCalibration:
 
     cameras: tuple[str, ...]
     fit: TurnFit
-    halves: Halves
+    halves: TurnHalves
     brightest: tuple[np.ndarray, ...]
     found_share: float
 
