@@ -1,7 +1,9 @@
 """What the tests across packages share: real pictures, real processes, and ways to hurt them."""
 
+import fcntl
 import os
 import shutil
+import subprocess
 from pathlib import Path
 
 import hypothesis
@@ -86,3 +88,29 @@ def browser(tmp_path_factory):
     driver.downloads = downloads
     yield driver
     driver.quit()
+
+
+@pytest.fixture(scope='session')
+def interfaces() -> dict[str, str]:
+    """Build the message packages in interfaces/; return variables with which nodes find them."""
+    root = Path(__file__).parents[1]
+    build = root / 'build' / 'test_interfaces'
+    build.mkdir(parents=True, exist_ok=True)
+    with (build / 'lock').open('w') as lock:  # tests that run beside these want them too
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        # Where they lie colcon ignores them, so that no workspace has them beside the real ones.
+        shutil.copytree(
+            root / 'test' / 'interfaces',
+            build / 'src',
+            ignore=shutil.ignore_patterns('COLCON_IGNORE'),
+            dirs_exist_ok=True,
+        )
+        command = ['colcon', '--log-base', build / 'log', 'build', '--base-paths', build / 'src']
+        command += ['--build-base', build / 'build', '--install-base', build / 'install']
+        command += ['--cmake-args', '-DBUILD_TESTING=OFF']
+        done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    shell = f'set +u; source {build}/install/local_setup.bash && env -0'
+    lines = subprocess.run(['bash', '-c', shell], capture_output=True, check=True).stdout
+    variables = dict(line.split('=', 1) for line in os.fsdecode(lines).split('\0') if '=' in line)
+    return {name: value for name, value in variables.items() if os.environ.get(name) != value}

@@ -1,9 +1,6 @@
 """The panorama and the cameras as video: real processes, other message types, recordings."""
 
 import json
-import os
-import shutil
-import subprocess
 import sys
 from pathlib import Path
 
@@ -26,7 +23,7 @@ from fisheye_testing.waiting import wait_for
 from fisheye_testing.watcher import Watcher
 
 ROOT = Path(__file__).parents[1]
-START_S, BUILD_S = 40.0, 300.0
+START_S = 40.0
 TOPIC = 'panorama/video/compressed'
 SAME_DB = 30.0
 """With the panorama of any other stamp it is less: the scene moves."""
@@ -185,31 +182,10 @@ def test_a_recording_of_the_video_is_played_back(running, take, tmp_path):
     assert cv2.imread(str(picture)).shape == first.shape
 
 
-@pytest.fixture(scope='session')
-def foreign_messages():
-    """Build the message packages of others that carry video; return what they add to a shell."""
-    build = ROOT / 'build' / 'test_interfaces'
-    # Where they lie colcon ignores them, so that no workspace has them beside the real ones.
-    shutil.copytree(
-        ROOT / 'test' / 'interfaces',
-        build / 'src',
-        ignore=shutil.ignore_patterns('COLCON_IGNORE'),
-        dirs_exist_ok=True,
-    )
-    command = ['colcon', '--log-base', build / 'log', 'build', '--base-paths', build / 'src']
-    command += ['--build-base', build / 'build', '--install-base', build / 'install']
-    command += ['--cmake-args', '-DBUILD_TESTING=OFF']
-    done = subprocess.run(command, capture_output=True, text=True, timeout=BUILD_S)
-    assert done.returncode == 0, done.stdout + done.stderr
-    shell = f'set +u; source {build}/install/local_setup.bash && env -0'
-    lines = subprocess.run(['bash', '-c', shell], capture_output=True, check=True).stdout
-    return dict(line.split('=', 1) for line in os.fsdecode(lines).split('\0') if '=' in line)
-
-
 def test_foxglove_and_image_transport_get_messages_of_theirs_where_they_are_installed(
-    domain, foreign_messages, tmp_path
+    domain, interfaces, tmp_path
 ):
-    with RigProcesses(domain, tmp_path / 'log', foreign_messages) as rig:
+    with RigProcesses(domain, tmp_path / 'log', interfaces) as rig:
         rig.start('panorama', width=640, height=480)
         program = [sys.executable, str(ROOT / 'test' / 'video_client.py')]
         rig.run('client', [*program, str(tmp_path / 'taken.json')])

@@ -1,8 +1,5 @@
-"""Where views look, as tf2 hears it; with an interface package of the same fields where ROS's
-own is not installed.
-"""
+"""Where views look, as tf2 hears it."""
 
-import importlib.util
 import json
 import os
 import subprocess
@@ -19,43 +16,23 @@ from fisheye_testing.rig import RigProcesses
 from fisheye_testing.waiting import wait_for
 
 START_S = 60.0
-ROOT = Path(__file__).parents[1]
-INTERFACES = ROOT / 'test' / 'interfaces'
 EXACT_DEG = 1e-3
 
 
-@pytest.fixture(scope='module')
-def environment():
-    """Return variables with which tf2_msgs is found; it is built once where it is not there."""
-    if importlib.util.find_spec('tf2_msgs'):
-        return {}
-    place = ROOT / 'build' / 'interfaces'
-    command = ['colcon', '--log-base', place / 'log', 'build', '--base-paths', INTERFACES]
-    command += ['--build-base', place / 'build', '--install-base', place / 'install']
-    built = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert built.returncode == 0, built.stdout + built.stderr
-    script = f'source {place}/install/local_setup.bash && env -0'
-    said = subprocess.run(['bash', '-c', script], capture_output=True, text=True, check=True)
-    changed = set(said.stdout.split('\0')) - {
-        f'{key}={value}' for key, value in os.environ.items()
-    }
-    return dict(entry.split('=', 1) for entry in changed if '=' in entry)
-
-
 @pytest.fixture
-def rig(domain, tmp_path, environment):
-    with RigProcesses(domain, tmp_path / 'log', environment) as rig:
+def rig(domain, tmp_path, interfaces):
+    with RigProcesses(domain, tmp_path / 'log', interfaces) as rig:
         yield rig
 
 
 @pytest.fixture
-def heard(domain, environment):
+def heard(domain, interfaces):
     """Return a function that gives the transforms of the next messages of a topic."""
 
     def listen(topic, count=1):
         done = subprocess.run(
             [sys.executable, Path(__file__).with_name('tf_listener.py'), topic, str(count)],
-            env={**os.environ, **environment, 'ROS_DOMAIN_ID': str(domain)},
+            env={**os.environ, **interfaces, 'ROS_DOMAIN_ID': str(domain)},
             capture_output=True,
             text=True,
             timeout=START_S,
