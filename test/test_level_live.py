@@ -23,6 +23,8 @@ from fisheye_testing.waiting import wait_for
 
 START_S = 60.0
 LEVEL_DEG = 0.5
+UNKNOWN_PX = 0.5
+"""Where between two pixels a horizon is nobody can tell."""
 SHOTS = 4
 """Of the page, one after the other, each of another picture: what is right by chance is not so
 often. A machine without time for the IMU's messages may have to try again."""
@@ -182,7 +184,7 @@ def page_error_deg(browser, watcher):
     px_per_deg = np.radians(projection.focal_px) * scale
     columns = slice(round(0.1 * shot.shape[1]), round(0.9 * shot.shape[1]))
     found = horizon(shot[:, columns], row, 14 * px_per_deg)
-    return np.abs(found - row).max() / px_per_deg, shot.tobytes()
+    return (np.abs(found - row).max() - UNKNOWN_PX) / px_per_deg, shot.tobytes()
 
 
 def views_are_level(seen):
@@ -210,5 +212,4 @@ def snapshot_error_deg(domain, folder):
     row = int(tags[b'FullPanoHeightPixels']) / 2 - int(tags[b'CroppedAreaTopPixels']) - 0.5
     columns = slice(round(0.15 * sphere.shape[1]), round(0.85 * sphere.shape[1]))
     found = horizon(sphere[:, columns], row, 14 * px_per_deg)
-    # Where between two pixels it is nobody can tell.
-    return (np.abs(found - row).max() - 0.5) / px_per_deg
+    return (np.abs(found - row).max() - UNKNOWN_PX) / px_per_deg
