@@ -21,7 +21,8 @@ from network import FOV_DEG, OFFSET_PX, SIZE, Ages
 from slow_link import ROBOT, LinkQuality, SlowLink
 
 from fisheye_capture.synthetic import synthetic_lens
-from fisheye_testing.rig import RigProcesses, unused_domain
+from fisheye_testing.domains import unused_domain
+from fisheye_testing.rig import RigProcesses
 from fisheye_testing.waiting import wait_for
 
 LINKS = {

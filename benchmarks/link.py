@@ -8,7 +8,8 @@ from known_rigs import synthetic_rig
 from nodes import cpu_s, save_rig
 from stages import Stage, measure_stages
 
-from fisheye_testing.rig import RigProcesses, unused_domain
+from fisheye_testing.domains import unused_domain
+from fisheye_testing.rig import RigProcesses
 from fisheye_testing.waiting import wait_for
 from fisheye_testing.watcher import Watcher
 

@@ -23,8 +23,9 @@ from fisheye_bridge.stamps import ns_of
 from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.camera_file import Camera, write_camera
 from fisheye_testing import network_camera
+from fisheye_testing.domains import unused_domain
 from fisheye_testing.painted_time import BLOCKS, age_ms, centres_px, read
-from fisheye_testing.rig import SIDES, RigProcesses, unused_domain
+from fisheye_testing.rig import SIDES, RigProcesses
 from fisheye_testing.waiting import wait_for
 from fisheye_testing.watcher import Watcher
 

@@ -21,9 +21,10 @@ from fisheye_capture.capture_settings import CaptureSettings
 from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.camera_file import Camera, write_camera
+from fisheye_testing.domains import unused_domain
 from fisheye_testing.health import usage
 from fisheye_testing.image_message import stamp_ns
-from fisheye_testing.rig import RigProcesses, unused_domain
+from fisheye_testing.rig import RigProcesses
 from fisheye_testing.waiting import wait_for
 from fisheye_testing.watcher import IMAGE_INPUT, Watcher
 

@@ -25,7 +25,8 @@ from fisheye_core.errors import FisheyeError
 from fisheye_core.h264_encoder import H264Encoder
 from fisheye_core.video import video_decoder
 from fisheye_core.video_settings import VideoSettings
-from fisheye_testing.rig import RigProcesses, unused_domain
+from fisheye_testing.domains import unused_domain
+from fisheye_testing.rig import RigProcesses
 from fisheye_testing.waiting import wait_for
 from fisheye_testing.watcher import Watcher
 

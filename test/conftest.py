@@ -12,7 +12,8 @@ from field import Field
 from selenium import webdriver
 
 from fisheye_testing.data import real_data
-from fisheye_testing.rig import RigProcesses, unused_domain
+from fisheye_testing.domains import unused_domain
+from fisheye_testing.rig import RigProcesses
 from fisheye_testing.watcher import Watcher
 
 

@@ -12,8 +12,9 @@ import pytest
 from field import START_S
 from namespaces import Namespace
 
+from fisheye_testing.domains import unused_domain
 from fisheye_testing.health import usage
-from fisheye_testing.rig import SEPARATE, SIDES, RigProcesses, unused_domain
+from fisheye_testing.rig import SEPARATE, SIDES, RigProcesses
 from fisheye_testing.waiting import wait_for
 from fisheye_testing.watcher import Watcher
 
@@ -174,6 +175,9 @@ def test_two_systems_in_two_domains_do_not_meet(rig, watcher, domain, tmp_path):
         seen = {}
         for name, one in (('first', watcher), ('second', other_watcher)):
             wait_for(lambda one=one: len(one.stamps_ns) > RATE_HZ, START_S, f'the {name} system')
+            wait_for(lambda one=one: one.is_measured, START_S, f'the overlap of the {name}')
+            count = len(one.stamps_ns)
+            wait_for(lambda one=one, n=count: len(one.stamps_ns) > n + 2, START_S, 'more of it')
             seen[name] = one.newest.width
             assert one.node.count_publishers('panorama/image') == 1
         assert seen['first'] < seen['second']

@@ -10,9 +10,10 @@ from fisheye_msgs.srv import CalibrateOverlap
 from sensor_msgs.msg import Image
 
 from fisheye_bridge.qos import IMAGE_INPUT
+from fisheye_testing.domains import unused_domain
 from fisheye_testing.health import Health
 from fisheye_testing.mjpeg_server import MjpegServer, jpeg
-from fisheye_testing.rig import SIDES, RigProcesses, unused_domain
+from fisheye_testing.rig import SIDES, RigProcesses
 from fisheye_testing.waiting import wait_for
 
 STOP_S = 2.0

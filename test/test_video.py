@@ -17,8 +17,9 @@ from fisheye_bridge.qos import IMAGE_INPUT, VIDEO, VIDEO_INPUT
 from fisheye_bridge.stamps import ns_of
 from fisheye_core.nal_units import is_keyframe
 from fisheye_core.video import video_decoder
+from fisheye_testing.domains import unused_domain
 from fisheye_testing.image_message import to_array
-from fisheye_testing.rig import RigProcesses, unused_domain
+from fisheye_testing.rig import RigProcesses
 from fisheye_testing.waiting import wait_for
 from fisheye_testing.watcher import Watcher
 

@@ -17,7 +17,8 @@ from fisheye_capture.synthetic import synthetic_lens
 from fisheye_capture.town import EYE_HEIGHT_M
 from fisheye_core.errors import FisheyeError
 from fisheye_geometry.camera_file import read_camera
-from fisheye_testing.rig import RigProcesses, unused_domain
+from fisheye_testing.domains import unused_domain
+from fisheye_testing.rig import RigProcesses
 from fisheye_testing.waiting import wait_for
 from fisheye_testing.watcher import Watcher
 from fisheye_undistort.correction import Correction

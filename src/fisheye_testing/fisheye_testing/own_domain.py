@@ -5,7 +5,7 @@ from typing import IO
 
 import pytest
 
-from fisheye_testing.rig import locked_domain
+from fisheye_testing.domains import locked_domain
 
 _LOCK = pytest.StashKey[IO[str]]()
 

@@ -1,18 +1,12 @@
 """A rig as real processes: the installed executables in a ROS domain of their own."""
 
-import fcntl
 import os
-import random
 import re
 import signal
 import subprocess
-import tempfile
 import time
-from collections import deque
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
-from typing import IO
 
 from ament_index_python.packages import get_package_prefix
 
@@ -28,10 +22,6 @@ SEPARATE = ('left/capture', 'right/capture', 'left/undistort', 'right/undistort'
 """The five nodes of a rig; `COMPOSED` does the same in one."""
 COMPOSED = ('panorama',)
 _STOP_TIMEOUT_S = 10.0
-_domain_locks: deque[IO[str]] = deque()
-"""Open files whose locks keep the last domains picked here."""
-_MOST_DOMAINS = 20
-"""Domains picked before these are free for others again."""
 
 
 def executable(node: str) -> Path:
@@ -39,26 +29,6 @@ def executable(node: str) -> Path:
     name = node.split('/')[-1]
     package = EXECUTABLES[name]
     return Path(get_package_prefix(package)) / 'lib' / package / f'{name}_node'
-
-
-def unused_domain() -> int:
-    """Pick a ROS domain that no other test on this machine uses."""
-    domain, lock = locked_domain()
-    _domain_locks.append(lock)
-    while len(_domain_locks) > _MOST_DOMAINS:
-        _domain_locks.popleft().close()
-    return domain
-
-
-def locked_domain() -> tuple[int, IO[str]]:
-    """Pick such a domain, and return it with the open file that keeps it."""
-    for domain in random.sample(range(1, 101), 100):
-        lock = Path(tempfile.gettempdir(), f'fisheye-domain-{domain}.lock').open('w')  # noqa: SIM115
-        with suppress(BlockingIOError):
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            return domain, lock
-        lock.close()
-    raise RuntimeError('every ROS domain from 1 to 100 is in use by a test')
 
 
 def camera_parameters(folder: Path | None) -> dict[str, dict[str, object]]:

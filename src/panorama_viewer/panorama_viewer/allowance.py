@@ -1,4 +1,8 @@
-"""How much of something is allowed: a token bucket."""
+"""How much of something is allowed: a token bucket, or one for each source."""
+
+from collections import OrderedDict
+
+_MAX_SOURCES = 1000
 
 
 class Allowance:
@@ -19,3 +23,19 @@ class Allowance:
             return False
         self._left -= amount
         return True
+
+
+class Allowances:
+    """The same for each source, of which the last thousand are remembered."""
+
+    def __init__(self, burst: float, per_s: float):
+        self._burst, self._per_s = burst, per_s
+        self._of: OrderedDict[str, Allowance] = OrderedDict()
+
+    def take(self, source: str, now_s: float) -> bool:
+        """Spend one of a source's; return whether it was left."""
+        allowance = self._of.pop(source, None) or Allowance(self._burst, self._per_s, now_s)
+        if len(self._of) >= _MAX_SOURCES:
+            self._of.popitem(last=False)
+        self._of[source] = allowance
+        return allowance.take(1, now_s)

@@ -8,7 +8,7 @@ token, or has a place to look from, is known: that connection stays.
 import asyncio
 import socket
 import ssl
-from collections import Counter, OrderedDict
+from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
 from errno import EADDRNOTAVAIL, EAFNOSUPPORT
@@ -17,7 +17,7 @@ from itertools import islice
 from aiohttp import web
 
 from panorama_viewer.address import source_of
-from panorama_viewer.allowance import Allowance
+from panorama_viewer.allowance import Allowances
 from panorama_viewer.connection import ANSWERED_WITHIN_S, Connection
 from panorama_viewer.faults import Faults
 
@@ -33,7 +33,6 @@ _CONNECTS, _CONNECTS_PER_S = 300, 200.0
 _MAX_REFUSED, _REFUSED_S = 256, 1.0
 """How many beyond that are held, and how long: who is told at once is back at once, again and
 again, and others of the same address hardly get a turn."""
-_MAX_ADDRESSES = 1000
 
 
 class Gate:
@@ -46,7 +45,7 @@ class Gate:
         self._entering: dict[asyncio.Task, None] = {}
         self._connections: dict[asyncio.BaseTransport, Connection] = {}
         self._strangers: dict[Connection, None] = {}
-        self._allowances: OrderedDict[str, Allowance] = OrderedDict()
+        self._allowances = Allowances(_CONNECTS, _CONNECTS_PER_S)
         self._refused: dict[socket.socket, None] = {}
 
     async def open(self, host: str, port: int, serve: Callable[[], asyncio.Protocol]) -> int:
@@ -94,6 +93,13 @@ class Gate:
             stranger.abort()
         self._let_go(len(self._refused))
 
+    async def end(self) -> None:
+        """Break off what is open still: over TLS a farewell may wait for an answer."""
+        for connection in list(self._connections.values()):
+            connection.abort()
+        while self._connections:
+            await asyncio.sleep(0)
+
     def connection(self, request: web.Request) -> Connection:
         """Return what a request came over; a `ConnectionError` if that has ended."""
         transport = request.transport
@@ -140,7 +146,7 @@ class Gate:
 
     def _admit(self, taken: socket.socket, address: str) -> None:
         source = source_of(address)
-        if not self._allowance(source).take(1, self._loop.time()):
+        if not self._allowances.take(source, self._loop.time()):
             self._refuse(taken)
             return
         self._make_room(len(self._strangers) + 1 - MAX_STRANGERS)
@@ -180,15 +186,6 @@ class Gate:
     def _close(self, taken: socket.socket) -> None:
         self._refused.pop(taken, None)
         taken.close()
-
-    def _allowance(self, source: str) -> Allowance:
-        allowance = self._allowances.pop(source, None)
-        if allowance is None:
-            allowance = Allowance(_CONNECTS, _CONNECTS_PER_S, self._loop.time())
-            if len(self._allowances) >= _MAX_ADDRESSES:
-                self._allowances.popitem(last=False)
-        self._allowances[source] = allowance
-        return allowance
 
     def _make_room(self, count: int) -> None:
         """Let strangers go, the oldest of the source that has the most."""

@@ -142,3 +142,5 @@ class ViewerServer:
         await self._site.close()
         if self._runner:
             await self._runner.cleanup()
+        if self._gate:
+            await self._gate.end()
