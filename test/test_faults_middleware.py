@@ -22,7 +22,7 @@ TOOLS = Path(__file__).parents[1] / 'tools'
 RATE_HZ = 30.0
 LONG = bool(os.environ.get('LONG'))
 ROUNDS = 5 if LONG else 2
-STOPS, HELD_UP = (50, 0) if LONG else (4, 1)
+STOPS, HELD_UP = (50, 0) if LONG else (3, 1)
 """How often a subscriber is stopped, and how often that may be noticed; it never is on a machine
 that does nothing else."""
 STOPPED_S, NOTICED_S = 1.0, 0.3
