@@ -53,10 +53,9 @@ def test_it_takes_rays_of_the_panorama_to_level_ones(measured, laid, extra):
     now = deg(0, -8, 5)
     robot.drive(1.2, 1.5, lambda _: laid)
     robot.drive(1.5, 2.0, lambda _: now)
-    overlaps = rig.effective_overlaps(settings)
-    still = robot.level.orientation(compositor, 10**9, overlaps, settings)
+    still = robot.level.orientation(compositor, 10**9, settings)
     assert np.degrees(angle_between(still.matrix, np.eye(3))) < CLOSE_DEG
-    turn = robot.level.orientation(compositor, round(1.95e9), overlaps, settings).matrix
+    turn = robot.level.orientation(compositor, round(1.95e9), settings).matrix
     # Where the world's down is seen in the panorama, and where it has to be.
     drawn = compositor.views[0].attitude.matrix @ PAIR[0].matrix.T
     down = turn @ drawn @ now.matrix.T @ DOWN
@@ -67,12 +66,11 @@ def test_without_an_imu_nothing_is_told(measured):
     rig, images = measured
     robot = Robot(rig)
     compositor = rig.compositor(SETTINGS, images)
-    overlaps = rig.effective_overlaps(SETTINGS)
-    assert robot.level.orientation(compositor, 0, overlaps, IMU) is None
+    assert robot.level.orientation(compositor, 0, IMU) is None
     (sentence,) = robot.level.faults()
     assert 'nothing came on the topic imu' in sentence
     robot.feel(deg(0, 0, 0), 1.0)
-    assert robot.level.orientation(compositor, 0, overlaps, SETTINGS) is None
+    assert robot.level.orientation(compositor, 0, SETTINGS) is None
 
 
 def test_a_nod_is_no_slope_and_a_slope_is_one(measured):
@@ -88,11 +86,10 @@ def test_an_imu_that_jumps_stops_or_has_another_clock_is_told(measured):
     robot = Robot(rig)
     robot.feel(deg(0, 0, 0), 1.0)
     compositor = rig.compositor(IMU, images)
-    overlaps = rig.effective_overlaps(IMU)
     level = robot.level
-    level.orientation(compositor, 10**9, overlaps, IMU)
+    level.orientation(compositor, 10**9, IMU)
     assert level.faults() == []
-    held = level.orientation(compositor, 61 * 10**9, overlaps, IMU)
+    held = level.orientation(compositor, 61 * 10**9, IMU)
     assert np.degrees(angle_between(held.matrix, np.eye(3))) < CLOSE_DEG
     assert 'the stamps of the imu are 60 s behind those of the pictures' in level.faults()[0]
     robot.feel(deg(0, 0, 90), 1.01)

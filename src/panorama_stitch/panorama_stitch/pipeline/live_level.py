@@ -4,7 +4,7 @@ The panorama itself is levelled by where things fall in the long run. What the r
 seconds is told beside it, as its orientation, so that nobody has to build a table for it.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from math import radians
 from time import monotonic
 
@@ -14,7 +14,6 @@ from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.inertial import ImuReading
 from fisheye_geometry.level import level_turn
 from panorama_stitch.compose.compositor import Compositor
-from panorama_stitch.overlap.overlap_result import Overlap
 from panorama_stitch.pipeline.gravity import GravityHistory, angle_rad
 from panorama_stitch.pipeline.panorama_settings import PanoramaOutputSettings
 from panorama_stitch.pipeline.rig_state import RigState
@@ -75,11 +74,7 @@ class LiveLevel:
         return turned_rad > _TURNED_RAD and now_s - self._used_s > _PAUSE_S
 
     def orientation(
-        self,
-        compositor: Compositor,
-        stamp_ns: int,
-        overlaps: Sequence[Overlap],
-        settings: PanoramaOutputSettings,
+        self, compositor: Compositor, stamp_ns: int, settings: PanoramaOutputSettings
     ) -> Attitude | None:
         """Return what takes rays of a panorama to level rays at a time.
 
@@ -89,7 +84,7 @@ class LiveLevel:
             Of the panorama.
         stamp_ns
             When it was taken.
-        overlaps, settings
+        settings
             In use.
 
         Returns
@@ -103,6 +98,7 @@ class LiveLevel:
         if down is None or any(view.shift_px[0] for view in compositor.views):
             return None
         if compositor is not self._levelled:
+            overlaps = self.rig.effective_overlaps(settings)
             robot = self.rig.solve(overlaps, settings, level='symmetric').rig.cameras[0]
             drawn = compositor.views[0].attitude.matrix
             self._from_robot, self._levelled = drawn @ robot.attitude.matrix.T, compositor

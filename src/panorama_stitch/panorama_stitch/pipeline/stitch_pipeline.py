@@ -218,5 +218,5 @@ class StitchPipeline:
             stale,
             frozenset(map(cameras.index, frames.ages_s)),
             self.economy.started(),
-            self.level.orientation(compositor, frames.stamp_ns, self.overlaps, self.settings),
+            self.level.orientation(compositor, frames.stamp_ns, self.settings),
         )
