@@ -139,8 +139,7 @@ class GravityHistory:
         trust_s = _TRUST_NOTHING_S if reading.turn_rad_s is None else _TRUST_TURN_S
         # At first it is the mean of all that was felt.
         trust_s = min(trust_s, self._age_s)
-        down = expected + (1 - exp(-since_s / trust_s)) * (reading.down - expected)
-        return down / max(float(np.linalg.norm(down)), 1e-9)
+        return towards(expected, reading.down, 1 - exp(-since_s / trust_s))
 
 
 def _turned(down: np.ndarray, turn_rad_s: np.ndarray, seconds: float) -> np.ndarray:
@@ -153,8 +152,13 @@ def _between(moment: _Moment, later: _Moment | None, stamp_ns: int) -> np.ndarra
     if later is None:
         return _turned(moment.down, moment.turn_rad_s, min(after_s, _AHEAD_S))
     share = (stamp_ns - moment.stamp_ns) / (later.stamp_ns - moment.stamp_ns)
-    down = moment.down + share * (later.down - moment.down)
-    return down / max(float(np.linalg.norm(down)), 1e-9)
+    return towards(moment.down, later.down, share)
+
+
+def towards(first: np.ndarray, second: np.ndarray, share: float) -> np.ndarray:
+    """Return the direction (3,) that lies a share of the way from one to another."""
+    between = first + share * (second - first)
+    return between / max(float(np.linalg.norm(between)), 1e-9)
 
 
 def angle_rad(first: np.ndarray, second: np.ndarray) -> float:

@@ -14,7 +14,7 @@ from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.inertial import ImuReading
 from fisheye_geometry.level import level_turn
 from panorama_stitch.compose.compositor import Compositor
-from panorama_stitch.pipeline.gravity import GravityHistory, angle_rad
+from panorama_stitch.pipeline.gravity import GravityHistory, angle_rad, towards
 from panorama_stitch.pipeline.panorama_settings import PanoramaOutputSettings
 from panorama_stitch.pipeline.rig_state import RigState
 
@@ -58,8 +58,7 @@ class LiveLevel:
         # At first it is the mean of all that was felt.
         share = since_s / max(min(_LONG_RUN_S, self._age_s), 1e-9)
         former = down if self._long_run is None else self._long_run
-        mean = former + min(share, 1.0) * (down - former)
-        self._long_run = mean / max(float(np.linalg.norm(mean)), 1e-9)
+        self._long_run = towards(former, down, min(share, 1.0))
         if self._age_s < _FIRST_S or not self._is_other(now_s):
             return False
         self.rig.gravity, self._used_s = self._long_run, now_s
