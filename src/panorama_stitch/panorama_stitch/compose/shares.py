@@ -39,20 +39,17 @@ class Joint:
         Indices of the cameras.
     box
         The part of the picture that is blended.
-    mask
-        (height, width) uint8 of the box: 1 where the blend is used.
+    zone
+        (height, width) bool of the box: where both show the scene, and the blend is used.
     ramp
         (height, width) float32 of the box: how far the left camera has given way.
-    seen
-        Where each of the two is to be shown in the box.
     """
 
     left: int
     right: int
     box: Box
-    mask: np.ndarray
+    zone: np.ndarray
     ramp: np.ndarray
-    seen: tuple[np.ndarray, np.ndarray]
 
 
 def distance_px(columns: np.ndarray, seam: Seam, layout: Layout) -> np.ndarray:
@@ -73,7 +70,12 @@ def ramps(layout: Layout, distances: Sequence[np.ndarray]) -> list[np.ndarray]:
     ]
 
 
-def owners(layout: Layout, faded: Sequence[np.ndarray], seen: dict[int, Seen]) -> np.ndarray:
+def owners(
+    layout: Layout,
+    faded: Sequence[np.ndarray],
+    seen: dict[int, Seen],
+    shape: tuple[int, int],
+) -> np.ndarray:
     """Return the index of the camera that shows each pixel, (height, width) int8; -1 for none.
 
     Parameters
@@ -84,8 +86,9 @@ def owners(layout: Layout, faded: Sequence[np.ndarray], seen: dict[int, Seen]) -
         As `ramps` returns them.
     seen
         Of each camera that may show anything, by its index.
+    shape
+        Height and width.
     """
-    shape = next(iter(seen.values())).shows.shape
     best, owner = np.zeros(shape, np.float32), np.full(shape, -1, np.int8)
     last = len(layout.order) - 1
     for at, index in enumerate(layout.order):
@@ -125,9 +128,8 @@ def joints(
         zone &= seen[left].scene & seen[right].scene
         if (box := box_of(zone)) is None:
             continue
-        zone = zone[box]
         ramp = np.ascontiguousarray(ramp[box], np.float32)
-        found.append(Joint(left, right, box, zone.astype(np.uint8), ramp, (zone, zone)))
+        found.append(Joint(left, right, box, zone[box].copy(), ramp))
     return found
 
 

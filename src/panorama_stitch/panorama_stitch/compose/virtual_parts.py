@@ -63,7 +63,7 @@ class JointBlend(NamedTuple):
             for index in (joint.left, joint.right)
         )
         self.blend(left, right, economical=economical)
-        cv2.copyTo(right, joint.mask, out[joint.box])
+        cv2.copyTo(right, joint.zone.view(np.uint8), out[joint.box])
 
 
 def parts_of(

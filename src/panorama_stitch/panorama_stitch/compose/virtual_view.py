@@ -82,15 +82,11 @@ class VirtualView:
         tables, seen = _tables(compositor.views, surface, attitude, moves)
         distances = _distances(layout, surface, attitude, moves)
         faded = ramps(layout, distances)
-        owner = owners(layout, faded, seen) if seen else np.full(shape, -1, np.int8)
+        owner = owners(layout, faded, seen, shape)
         kind = Feather if moves else compositor.blend
-        found = (
-            joints(layout, distances, faded, seen, owner, needs_overlap=kind.needs_overlap)
-            if seen
-            else []
-        )
+        found = joints(layout, distances, faded, seen, owner, needs_overlap=kind.needs_overlap)
         self._parts = parts_of(tables, owner, found)
-        self._blends = [JointBlend(joint, kind(*joint.seen, joint.ramp)) for joint in found]
+        self._blends = [JointBlend(one, kind(one.zone, one.zone, one.ramp)) for one in found]
         self.cameras = tuple(self._parts)
         self.seen_share = float((owner >= 0).mean())
 
