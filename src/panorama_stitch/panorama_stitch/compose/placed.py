@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fisheye_geometry.surface import Surface
-from panorama_stitch.compose.view import Cut, View, shown
+from panorama_stitch.compose.view import Cut, View
 
 
 @dataclass(eq=False)
@@ -40,11 +40,9 @@ class PlacedView:
         """Compute what is drawn where on the surface of the panorama."""
         width = max(1, self.end - self.begin)
         self._table = self.view.drawn_on(surface.window(self.begin, 0, width, surface.height))
-        self.valid = self._table.valid
-        if self.view.seen is not None:
-            self.valid = shown(self.view.seen, self._table, self.valid.shape)
-        if self.view.body is not None:
-            self.body = ~shown(~self.view.body, self._table, self.valid.shape) & self.valid
+        self.valid, body = self.view.shows(self._table), self.view.shows_body(self._table)
+        if body is not None:
+            self.body = body & self.valid
 
     def cut(self, rows: slice, columns: slice) -> Cut:
         """Prepare to draw a part, in rows and columns of the whole panorama."""

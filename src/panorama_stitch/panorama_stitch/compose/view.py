@@ -128,10 +128,12 @@ class View:
 
     def shows_scene(self, table: 'Table') -> np.ndarray:
         """(height, width) bool: where a table of this view shows anything but the robot itself."""
-        valid = self.shows(table)
-        if self.body is not None:
-            valid = valid & shown(~self.body, table, valid.shape)
-        return valid
+        valid, body = self.shows(table), self.shows_body(table)
+        return valid if body is None else valid & ~body
+
+    def shows_body(self, table: 'Table') -> np.ndarray | None:
+        """(height, width) bool: where a table of this view may show the robot; None: nowhere."""
+        return None if self.body is None else ~shown(~self.body, table, table.valid.shape)
 
     def _copied_to(self, surface: Surface) -> tuple[int, int] | None:
         """Upper left pixel of the source that a surface begins with; None if pixels are mixed."""
