@@ -8,12 +8,12 @@ from fisheye_core.errors import SettingError
 from fisheye_core.settings import setting
 from fisheye_core.video_settings import VideoSettings
 from fisheye_geometry.level import LEVELS, Mount
-from fisheye_geometry.rig import CAMERA_NAME, MAX_CAMERAS, RINGS
+from fisheye_geometry.rig import MAX_CAMERAS, RINGS
 from fisheye_undistort.undistort_settings import SurfaceSettings
 from panorama_stitch.compose.blends import BLENDS
 from panorama_stitch.compose.layout import CROPS
 from panorama_stitch.overlap.overlap_settings import OverlapSettings
-from panorama_stitch.pipeline.view_settings import ViewNames
+from panorama_stitch.pipeline.view_settings import ViewNames, check_names
 
 
 @dataclass(frozen=True)
@@ -138,11 +138,7 @@ class PanoramaOutputSettings(ViewNames, OverlapSettings, VideoSettings):
             raise SettingError(
                 f'cameras is {list(cameras)}; expected 1 to {MAX_CAMERAS} different names'
             )
-        for name in cameras:
-            if not CAMERA_NAME.fullmatch(name):
-                raise SettingError(
-                    f"cameras has '{name}'; expected a letter, then letters, digits or _"
-                )
+        check_names('cameras', cameras)
         self.check_views(cameras)
         for name in ('offset_x_px', 'offset_y_px'):
             values = getattr(self, name)

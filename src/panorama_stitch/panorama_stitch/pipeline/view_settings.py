@@ -14,6 +14,15 @@ _YAWS_DEG = {'left': -90.0, 'right': 90.0, 'rear': 180.0, 'back': 180.0}
 """Where views look whose names begin so, if nothing else is said."""
 
 
+def check_names(setting_name: str, names: Sequence[str]) -> None:
+    """Raise a `SettingError` for a name that a setting has and that is no namespace."""
+    for name in names:
+        if not CAMERA_NAME.fullmatch(name):
+            raise SettingError(
+                f"{setting_name} has '{name}'; expected a letter, then letters, digits or _"
+            )
+
+
 @dataclass(frozen=True)
 class ViewNames:
     """Which views there are."""
@@ -32,11 +41,8 @@ class ViewNames:
             raise SettingError(f'views has {len(views)} names; expected up to {MAX_VIEWS}')
         if len(set(views)) != len(views):
             raise SettingError(f'views is {list(views)}; expected different names')
+        check_names('views', views)
         for name in views:
-            if not CAMERA_NAME.fullmatch(name):
-                raise SettingError(
-                    f"views has '{name}'; expected a letter, then letters, digits or _"
-                )
             if name in (*cameras, 'panorama'):
                 raise SettingError(
                     f"views has '{name}', whose topics are those of "
