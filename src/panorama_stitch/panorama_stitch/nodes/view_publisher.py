@@ -8,7 +8,6 @@ from std_msgs.msg import Header
 from fisheye_bridge.camera_info import camera_info_of
 from fisheye_bridge.diagnostics import ERROR, WARN, DropCounter, Report
 from fisheye_bridge.images import ImageBuffer
-from fisheye_bridge.parameters import Parameters
 from fisheye_bridge.qos import COMMAND, IMAGE
 from fisheye_bridge.stamps import stamp_of
 from fisheye_bridge.topics import ImagePublisher
@@ -32,7 +31,7 @@ class ViewPublisher:
         self,
         node: Node,
         name: str,
-        declared: Parameters,
+        settings: ViewSettings,
         transforms: TransformPublisher,
         frame_id: str,
     ):
@@ -44,16 +43,16 @@ class ViewPublisher:
             Whose topics they are.
         name
             Of the view.
-        declared
-            The parameters of the view, `ViewSettings`.
+        settings
+            Where the view looks.
         transforms
             Publishes where the view looks while it moves.
         frame_id
             Of the panorama.
         """
         self._node, self._name, self._parent = node, name, frame_id
-        self._declared, self._transforms = declared, transforms
-        self._view = LiveView(name, declared.settings)
+        self._transforms = transforms
+        self._view = LiveView(name, settings)
         self._fault = ''
         self._rate = RateMeter()
         self._buffer: ImageBuffer | None = None

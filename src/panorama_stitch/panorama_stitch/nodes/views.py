@@ -101,6 +101,5 @@ class Views:
     def _started(self, name: str) -> ViewPublisher:
         if name not in self._declared:
             self._declared[name] = Parameters(self._node, ViewSettings, prefix=f'{name}.')
-        return ViewPublisher(
-            self._node, name, self._declared[name], self._transforms, self._frame_id
-        )
+        settings = self._declared[name].settings
+        return ViewPublisher(self._node, name, settings, self._transforms, self._frame_id)
