@@ -4,17 +4,18 @@ A remap table of all pixels takes as long as many frames. Through a mesh it is t
 milliseconds, so that a camera that moves can have one for each frame.
 """
 
+from copy import copy
+
 import cv2
 import numpy as np
 
 from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.lens import Lens
-from fisheye_geometry.remap import INTERPOLATION_FLAGS, on_picture
+from fisheye_geometry.remap import INTERPOLATION_FLAGS, OUTSIDE_PX, on_picture
 from fisheye_geometry.surface import Surface
 
 _STEP_PX = 8
 """Pixels from node to node: a fisheye's picture on a plane bends by 0.02 px in between."""
-_OUTSIDE_PX = -100.0
 _ALL = 1 - 1e-4
 """Share of nodes around a pixel that means all of them."""
 
@@ -71,14 +72,13 @@ class MeshTable:
         self.valid: np.ndarray = mesh.spread(seen) > _ALL
         self._map = mesh.spread(pixels)
         if not self.valid.all():
-            self._map[~self.valid] = _OUTSIDE_PX
+            self._map[~self.valid] = OUTSIDE_PX
         self._flag = INTERPOLATION_FLAGS[interpolation]
 
     def part(self, rows: slice, columns: slice) -> 'MeshTable':
         """Return the table of a part of the surface."""
-        part = object.__new__(MeshTable)
-        part.valid, part._flag = self.valid[rows, columns], self._flag
-        part._map = self._map[rows, columns]
+        part = copy(self)
+        part.valid, part._map = self.valid[rows, columns], self._map[rows, columns]
         return part
 
     def __call__(self, image: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:

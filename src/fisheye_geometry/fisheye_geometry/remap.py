@@ -19,7 +19,7 @@ INTERPOLATION_FLAGS = {
 }
 INTERPOLATIONS = tuple(INTERPOLATION_FLAGS)
 
-_OUTSIDE_PX = -100
+OUTSIDE_PX = -100
 """Far enough from the picture that no interpolation reaches it."""
 
 
@@ -190,5 +190,5 @@ def _source_pixels(
     pixels, seen = on_picture(source, surface.rays(x, y) @ attitude.matrix)
     # Beyond its centre the outermost pixel is repeated.
     last = np.array([source.width - 1, source.height - 1])
-    where = np.where(seen[..., None], np.clip(pixels, 0, last), _OUTSIDE_PX)
+    where = np.where(seen[..., None], np.clip(pixels, 0, last), OUTSIDE_PX)
     return where.astype(np.float32), seen
