@@ -1,7 +1,6 @@
 """The pipeline: pairs become panoramas, a silent camera is shown as such and comes back."""
 
 import gc
-import threading
 import time
 from dataclasses import replace
 from functools import partial
@@ -10,91 +9,15 @@ from unittest.mock import Mock
 import cv2
 import numpy as np
 import pytest
+from pipeline_line import DEADLINE_S, LENS, SETTINGS, STEP_NS, YAW, Line, overlap_in_use
 
-from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens
-from fisheye_core.errors import FileAccessError, ImageFormatError, OverlapError
-from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.remap import RemapTable
 from panorama_stitch.compose.compositor import Compositor
-from panorama_stitch.pipeline import compositor_builder
 from panorama_stitch.pipeline.metrics import economy_sentence, metrics, unpaired_sentence
-from panorama_stitch.pipeline.panorama_settings import PanoramaSettings
-from panorama_stitch.pipeline.stitch_pipeline import StitchPipeline
 
-LENS = synthetic_lens(320, 240, np.radians(170))
-YAW = np.radians(140)
-SETTINGS = PanoramaSettings(stale_after_s=0.2)
-DEADLINE_S = 20.0
-STEP_NS = 33_000_000
 TABLES = 3
 """A compositor needs at most so many for each camera: drawing, seams, gain."""
-
-
-@pytest.fixture(scope='module')
-def pictures():
-    views = [Scene().view(LENS, Attitude(yaw_rad=yaw)) for yaw in (-YAW / 2, YAW / 2)]
-    return dict(zip(('left', 'right'), (view.frame(0) for view in views), strict=True))
-
-
-class Line:
-    """A pipeline, what it made, and a hand that feeds it."""
-
-    def __init__(self, settings=SETTINGS):
-        self.published, self.warnings, self.economical = [], [], []
-        self.news, self.may_draw = threading.Event(), threading.Event()
-        self.may_draw.set()
-        self.pipeline = StitchPipeline(settings)
-        for camera in settings.cameras:
-            self.pipeline.place(camera, LENS, settings.surface_of(LENS))
-        self.stamp_ns = 0
-        self._thread = threading.Thread(target=self._draw, daemon=True)
-        self._thread.start()
-
-    def stop(self):
-        self.pipeline.stop()
-        self._thread.join()
-
-    def _draw(self):
-        while (panorama := self.pipeline.next()) is not None:
-            assert self.may_draw.wait(DEADLINE_S)
-            surface, image = panorama.surface, panorama.images[0]
-            out = np.empty((surface.height, surface.width, *image.shape[2:]), np.uint8)
-            panorama.draw(out)
-            self.published.append((panorama.stamp_ns, out, panorama.stale))
-            self.economical.append(panorama.is_economical)
-
-    def feed(self, pictures, until, what):
-        """Feed frames of these cameras until a condition holds."""
-        deadline = time.monotonic() + DEADLINE_S
-        while not until():
-            assert time.monotonic() < deadline, what
-            self.stamp_ns += STEP_NS
-            for camera, picture in pictures.items():
-                self.take(camera, picture)
-            self.warnings += self.pipeline.take_notices()
-            self.news.wait(0.01)
-
-    def take(self, camera, picture, later_ns=0):
-        encoding = 'mono8' if picture.ndim == 2 else 'bgr8'
-        self.pipeline.take(camera, self.stamp_ns + later_ns, picture, encoding)
-
-
-@pytest.fixture
-def make_line():
-    lines = []
-
-    def make(settings=SETTINGS):
-        lines.append(Line(settings))
-        return lines[-1]
-
-    yield make
-    for line in lines:
-        line.stop()
-
-
-def overlap_in_use(line):
-    return line.pipeline.rig.overlaps[0]
 
 
 def test_pairs_become_panoramas_with_a_measured_offset(make_line, pictures):
@@ -159,121 +82,6 @@ def test_with_both_silent_nothing_is_published(make_line, pictures):
     count = len(line.published)
     line.news.wait(0.3)
     assert len(line.published) == count
-
-
-def test_panoramas_go_on_while_the_overlap_is_measured(make_line, pictures):
-    line = make_line()
-    line.feed(pictures, lambda: line.published, 'a panorama')
-    answer = line.pipeline.calibrate('correlation', save=False)
-    line.feed(pictures, answer.done, 'an answer')
-    assert answer.result()[0].found
-
-
-def test_who_asks_again_meanwhile_gets_the_same_measurement(make_line, pictures):
-    line = make_line()
-    line.feed(pictures, lambda: line.published, 'a panorama')
-    first = line.pipeline.calibrate('correlation', save=False)
-    assert line.pipeline.calibrate('correlation', save=False) is first
-    other = line.pipeline.calibrate('', save=False)
-    assert other is not first
-    line.feed(pictures, other.done, 'an answer')
-    assert first.result()[0].found
-    assert line.pipeline.calibrate('', save=False) is not other
-
-
-def test_an_answer_without_overlap_never_replaces_a_good_one(make_line, pictures):
-    line = make_line()
-    line.feed(pictures, lambda: line.published, 'a panorama')
-    good = overlap_in_use(line)
-    dark = {camera: np.zeros_like(picture) for camera, picture in pictures.items()}
-    end = time.monotonic() + 1.5
-    line.feed(dark, lambda: time.monotonic() > end, 'time to forget the bright pictures')
-    assert not line.pipeline.calibrate('', save=False).result(DEADLINE_S)[0].found
-    assert overlap_in_use(line) == good
-
-
-def test_night_at_start_is_tried_again(make_line, pictures):
-    line = make_line()
-    dark = {camera: np.zeros_like(picture) for camera, picture in pictures.items()}
-    line.feed(dark, lambda: line.published, 'a dark panorama, side by side')
-    assert not overlap_in_use(line).found
-    line.feed(pictures, lambda: overlap_in_use(line).found, 'an overlap after all')
-
-
-def test_an_overlap_is_kept_in_its_file(make_line, pictures, tmp_path):
-    path = tmp_path / 'overlap.yaml'
-    settings = replace(SETTINGS, overlap_file=str(path))
-    first = make_line(settings)
-    first.feed(pictures, lambda: first.published, 'a panorama')
-    first.pipeline.calibrate('', save=True).result(DEADLINE_S)
-    second = make_line(replace(settings, auto_calibrate=False))
-    dark = {camera: np.zeros_like(picture) for camera, picture in pictures.items()}
-    second.feed(dark, lambda: second.published, 'a panorama')
-    assert overlap_in_use(second).offset_x_px == pytest.approx(overlap_in_use(first).offset_x_px)
-    path.write_text('version: 77')
-    third = make_line(settings)
-    third.feed(pictures, lambda: third.published, 'a panorama')
-    assert overlap_in_use(third).found
-    assert 'the overlap is measured instead' in third.warnings[0]
-
-
-def test_a_pipeline_goes_on_with_the_overlap_of_the_former_one(make_line, pictures):
-    first = make_line()
-    first.feed(pictures, lambda: first.published, 'a panorama')
-    (measured,) = first.pipeline.overlaps
-    assert measured.found
-    first.stop()
-    second = make_line(replace(SETTINGS, auto_calibrate=False))
-    second.pipeline.inherit(first.pipeline)
-    second.feed(pictures, lambda: second.published, 'a panorama')
-    assert second.pipeline.overlaps == [measured]
-
-
-def test_overlaps_of_other_lenses_are_not_inherited(make_line, pictures):
-    first = make_line()
-    first.feed(pictures, lambda: first.published, 'a panorama')
-    second = make_line(replace(SETTINGS, auto_calibrate=False, hfov_deg=150.0))
-    second.pipeline.inherit(first.pipeline)
-    second.feed(pictures, lambda: second.published, 'a panorama')
-    assert not second.pipeline.overlaps[0].found
-
-
-def test_what_cannot_be_done_is_said(make_line, pictures, tmp_path):
-    line = make_line()
-    with pytest.raises(OverlapError, match='no pair of frames has come yet'):
-        line.pipeline.calibrate('', save=False).result(DEADLINE_S)
-    line.feed(pictures, lambda: line.published, 'a panorama')
-    with pytest.raises(OverlapError, match='overlap_file is empty'):
-        line.pipeline.calibrate('', save=True).result(DEADLINE_S)
-    with pytest.raises(ImageFormatError, match='right has 10x10 px; expected 320x240'):
-        line.take('right', np.zeros((10, 10, 3), np.uint8))
-    (tmp_path / 'file').write_text('')
-    line.pipeline.apply(replace(SETTINGS, overlap_file=str(tmp_path / 'file' / 'overlap.yaml')))
-    before = overlap_in_use(line)
-    with pytest.raises(FileAccessError, match='cannot be written'):
-        line.pipeline.calibrate('', save=True).result(DEADLINE_S)
-    assert overlap_in_use(line) is before, 'what was in use stays in use'
-
-
-def test_what_was_not_found_is_not_saved(make_line, pictures, tmp_path):
-    path = tmp_path / 'overlap.yaml'
-    line = make_line(replace(SETTINGS, overlap_file=str(path)))
-    dark = {camera: np.zeros_like(picture) for camera, picture in pictures.items()}
-    line.feed(dark, lambda: line.published, 'a dark panorama')
-    line.pipeline.calibrate('', save=True).result(DEADLINE_S)
-    assert not path.exists()
-
-
-def test_a_file_that_cannot_even_be_looked_at_is_said(make_line, pictures):
-    line = make_line(replace(SETTINGS, overlap_file='x' * 5000))
-    line.feed(pictures, lambda: line.published, 'a panorama')
-    assert 'cannot be read' in line.warnings[0]
-
-
-def test_an_overlap_has_the_stamp_of_the_images_it_was_measured_on(make_line, pictures):
-    line = make_line()
-    line.feed(pictures, lambda: line.published, 'a panorama')
-    assert 0 < overlap_in_use(line).stamp_ns <= line.published[0][0] <= line.stamp_ns
 
 
 def test_a_setting_applies_to_the_next_frames(make_line, pictures):
@@ -366,45 +174,6 @@ def test_a_lens_that_changes_with_each_frame_stops_no_panorama(make_line, pictur
         line.pipeline.place('left', lens, SETTINGS.surface_of(lens))
         line.feed(pictures, lambda seen=count + index: len(line.published) >= seen, 'the next one')
     assert line.pipeline.frames.unpaired_s < SETTINGS.stale_after_s
-
-
-def test_the_published_rule_asked_for_once_ruins_no_rig(make_line, pictures):
-    line = make_line(replace(SETTINGS, min_confidence=0.5))
-    line.feed(pictures, lambda: line.published, 'a panorama')
-    good = overlap_in_use(line)
-    (asked,) = line.pipeline.calibrate('paper', save=False).result(DEADLINE_S)
-    assert (asked.method, asked.found) == ('paper', False)
-    assert asked.confidence < 0.5
-    assert 'the most similar particles put the right view at' in asked.message
-    assert '0.50 is needed (with the parameter method:=paper' in asked.message
-    assert overlap_in_use(line) == good
-    line.pipeline.apply(replace(SETTINGS, method='paper', min_confidence=0.5))
-    (asked,) = line.pipeline.calibrate('', save=False).result(DEADLINE_S)
-    assert asked.found
-    assert overlap_in_use(line) == asked
-
-
-def test_a_setting_that_changes_while_an_overlap_is_sought_need_not_wait(
-    make_line, pictures, monkeypatch
-):
-    line = make_line(replace(SETTINGS, stale_after_s=60.0))
-    dark = {camera: np.zeros_like(picture) for camera, picture in pictures.items()}
-    measure = compositor_builder.measure_overlaps
-    is_measuring, resume = threading.Event(), threading.Event()
-
-    def measure_late(*arguments):
-        is_measuring.set()
-        resume.wait(DEADLINE_S)
-        return measure(*arguments)
-
-    monkeypatch.setattr(compositor_builder, 'measure_overlaps', measure_late)
-    line.feed(dark, is_measuring.is_set, 'a search')
-    line.pipeline.apply(replace(SETTINGS, stale_after_s=60.0, crop='none', feather_deg=3.0))
-    is_measuring.clear()
-    resume.set()
-    begin = time.monotonic()
-    line.feed(dark, is_measuring.is_set, 'the next search')
-    assert time.monotonic() - begin < 2.0, 'the pause between two searches'
 
 
 def test_what_was_made_for_former_settings_is_let_go(make_line, pictures):

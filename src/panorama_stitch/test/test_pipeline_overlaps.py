@@ -1,0 +1,166 @@
+"""Overlaps in the pipeline: measured while panoramas go on, kept, inherited, and told."""
+
+import threading
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pipeline_line import DEADLINE_S, SETTINGS, overlap_in_use
+
+from fisheye_core.errors import FileAccessError, ImageFormatError, OverlapError
+from panorama_stitch.pipeline import compositor_builder
+
+
+def test_panoramas_go_on_while_the_overlap_is_measured(make_line, pictures):
+    line = make_line()
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    answer = line.pipeline.calibrate('correlation', save=False)
+    line.feed(pictures, answer.done, 'an answer')
+    assert answer.result()[0].found
+
+
+def test_who_asks_again_meanwhile_gets_the_same_measurement(make_line, pictures):
+    line = make_line()
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    first = line.pipeline.calibrate('correlation', save=False)
+    assert line.pipeline.calibrate('correlation', save=False) is first
+    other = line.pipeline.calibrate('', save=False)
+    assert other is not first
+    line.feed(pictures, other.done, 'an answer')
+    assert first.result()[0].found
+    assert line.pipeline.calibrate('', save=False) is not other
+
+
+def test_an_answer_without_overlap_never_replaces_a_good_one(make_line, pictures):
+    line = make_line()
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    good = overlap_in_use(line)
+    dark = {camera: np.zeros_like(picture) for camera, picture in pictures.items()}
+    end = time.monotonic() + 1.5
+    line.feed(dark, lambda: time.monotonic() > end, 'time to forget the bright pictures')
+    assert not line.pipeline.calibrate('', save=False).result(DEADLINE_S)[0].found
+    assert overlap_in_use(line) == good
+
+
+def test_night_at_start_is_tried_again(make_line, pictures):
+    line = make_line()
+    dark = {camera: np.zeros_like(picture) for camera, picture in pictures.items()}
+    line.feed(dark, lambda: line.published, 'a dark panorama, side by side')
+    assert not overlap_in_use(line).found
+    line.feed(pictures, lambda: overlap_in_use(line).found, 'an overlap after all')
+
+
+def test_an_overlap_is_kept_in_its_file(make_line, pictures, tmp_path):
+    path = tmp_path / 'overlap.yaml'
+    settings = replace(SETTINGS, overlap_file=str(path))
+    first = make_line(settings)
+    first.feed(pictures, lambda: first.published, 'a panorama')
+    first.pipeline.calibrate('', save=True).result(DEADLINE_S)
+    second = make_line(replace(settings, auto_calibrate=False))
+    dark = {camera: np.zeros_like(picture) for camera, picture in pictures.items()}
+    second.feed(dark, lambda: second.published, 'a panorama')
+    assert overlap_in_use(second).offset_x_px == pytest.approx(overlap_in_use(first).offset_x_px)
+    path.write_text('version: 77')
+    third = make_line(settings)
+    third.feed(pictures, lambda: third.published, 'a panorama')
+    assert overlap_in_use(third).found
+    assert 'the overlap is measured instead' in third.warnings[0]
+
+
+def test_a_pipeline_goes_on_with_the_overlap_of_the_former_one(make_line, pictures):
+    first = make_line()
+    first.feed(pictures, lambda: first.published, 'a panorama')
+    (measured,) = first.pipeline.overlaps
+    assert measured.found
+    first.stop()
+    second = make_line(replace(SETTINGS, auto_calibrate=False))
+    second.pipeline.inherit(first.pipeline)
+    second.feed(pictures, lambda: second.published, 'a panorama')
+    assert second.pipeline.overlaps == [measured]
+
+
+def test_overlaps_of_other_lenses_are_not_inherited(make_line, pictures):
+    first = make_line()
+    first.feed(pictures, lambda: first.published, 'a panorama')
+    second = make_line(replace(SETTINGS, auto_calibrate=False, hfov_deg=150.0))
+    second.pipeline.inherit(first.pipeline)
+    second.feed(pictures, lambda: second.published, 'a panorama')
+    assert not second.pipeline.overlaps[0].found
+
+
+def test_what_cannot_be_done_is_said(make_line, pictures, tmp_path):
+    line = make_line()
+    with pytest.raises(OverlapError, match='no pair of frames has come yet'):
+        line.pipeline.calibrate('', save=False).result(DEADLINE_S)
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    with pytest.raises(OverlapError, match='overlap_file is empty'):
+        line.pipeline.calibrate('', save=True).result(DEADLINE_S)
+    with pytest.raises(ImageFormatError, match='right has 10x10 px; expected 320x240'):
+        line.take('right', np.zeros((10, 10, 3), np.uint8))
+    (tmp_path / 'file').write_text('')
+    line.pipeline.apply(replace(SETTINGS, overlap_file=str(tmp_path / 'file' / 'overlap.yaml')))
+    before = overlap_in_use(line)
+    with pytest.raises(FileAccessError, match='cannot be written'):
+        line.pipeline.calibrate('', save=True).result(DEADLINE_S)
+    assert overlap_in_use(line) is before, 'what was in use stays in use'
+
+
+def test_what_was_not_found_is_not_saved(make_line, pictures, tmp_path):
+    path = tmp_path / 'overlap.yaml'
+    line = make_line(replace(SETTINGS, overlap_file=str(path)))
+    dark = {camera: np.zeros_like(picture) for camera, picture in pictures.items()}
+    line.feed(dark, lambda: line.published, 'a dark panorama')
+    line.pipeline.calibrate('', save=True).result(DEADLINE_S)
+    assert not path.exists()
+
+
+def test_a_file_that_cannot_even_be_looked_at_is_said(make_line, pictures):
+    line = make_line(replace(SETTINGS, overlap_file='x' * 5000))
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    assert 'cannot be read' in line.warnings[0]
+
+
+def test_an_overlap_has_the_stamp_of_the_images_it_was_measured_on(make_line, pictures):
+    line = make_line()
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    assert 0 < overlap_in_use(line).stamp_ns <= line.published[0][0] <= line.stamp_ns
+
+
+def test_the_published_rule_asked_for_once_ruins_no_rig(make_line, pictures):
+    line = make_line(replace(SETTINGS, min_confidence=0.5))
+    line.feed(pictures, lambda: line.published, 'a panorama')
+    good = overlap_in_use(line)
+    (asked,) = line.pipeline.calibrate('paper', save=False).result(DEADLINE_S)
+    assert (asked.method, asked.found) == ('paper', False)
+    assert asked.confidence < 0.5
+    assert 'the most similar particles put the right view at' in asked.message
+    assert '0.50 is needed (with the parameter method:=paper' in asked.message
+    assert overlap_in_use(line) == good
+    line.pipeline.apply(replace(SETTINGS, method='paper', min_confidence=0.5))
+    (asked,) = line.pipeline.calibrate('', save=False).result(DEADLINE_S)
+    assert asked.found
+    assert overlap_in_use(line) == asked
+
+
+def test_a_setting_that_changes_while_an_overlap_is_sought_need_not_wait(
+    make_line, pictures, monkeypatch
+):
+    line = make_line(replace(SETTINGS, stale_after_s=60.0))
+    dark = {camera: np.zeros_like(picture) for camera, picture in pictures.items()}
+    measure = compositor_builder.measure_overlaps
+    is_measuring, resume = threading.Event(), threading.Event()
+
+    def measure_late(*arguments):
+        is_measuring.set()
+        resume.wait(DEADLINE_S)
+        return measure(*arguments)
+
+    monkeypatch.setattr(compositor_builder, 'measure_overlaps', measure_late)
+    line.feed(dark, is_measuring.is_set, 'a search')
+    line.pipeline.apply(replace(SETTINGS, stale_after_s=60.0, crop='none', feather_deg=3.0))
+    is_measuring.clear()
+    resume.set()
+    begin = time.monotonic()
+    line.feed(dark, is_measuring.is_set, 'the next search')
+    assert time.monotonic() - begin < 2.0, 'the pause between two searches'
