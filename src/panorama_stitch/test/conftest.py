@@ -1,6 +1,9 @@
-"""Fixtures of the tests of the pipeline."""
+"""Fixtures of the tests of the pipeline, and of those of the launch file."""
+
+import sys
 
 import pytest
+from launch_file import FILE, LaunchFile
 from pipeline_line import LENS, SETTINGS, YAW, Line
 
 from fisheye_capture.scene import Scene
@@ -24,3 +27,9 @@ def make_line():
     yield make
     for line in lines:
         line.stop()
+
+
+@pytest.fixture
+def rig(monkeypatch):
+    monkeypatch.setattr(sys, 'argv', ['ros2', 'launch', 'panorama_stitch', FILE.name])
+    return LaunchFile(monkeypatch)
