@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_virtual_view import PAIR, RING, STAMP_NS, camera_at, drawn, rig_of
+from known_rigs import PAIR, RING, STAMP_NS, camera_at, drawn, rig_of
 
 from fisheye_core.errors import SettingError
 from panorama_stitch.pipeline.live_view import LiveView
