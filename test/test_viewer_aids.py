@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 import pytest
-import test_viewer_browser as viewer
+import viewer_page
 from selenium.webdriver import Keys
-from test_viewer_browser import CLOSED, MAGENTA, SEAM, SURFACES, Page, painted, patch
+from viewer_page import CLOSED, MAGENTA, SEAM, SURFACES, Page, painted, patch
 
 from fisheye_geometry.surface import Surface
 
-serve = viewer.serve  # its fixture
+serve = viewer_page.serve  # its fixture
 
 HEADING, GROUND, CAMERA = (132, 220, 61), (77, 216, 255), (255, 200, 94)
 """Blue, green and red of the marks."""
