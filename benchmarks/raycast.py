@@ -1,5 +1,6 @@
 """Things that rays meet: upright cylinders and rectangles; x to the right, y down, z ahead, m."""
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -66,6 +67,20 @@ class Wall:
     @property
     def _others(self) -> list[int]:
         return [axis for axis in range(3) if axis != self.axis]
+
+
+def nearer(
+    things: Iterable[Cylinder | Wall], x: float, z: float, rays: np.ndarray, distance: np.ndarray
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Yield which rays from (x, 0, z) meet each thing before `distance` (n,), and the colours.
+
+    `distance` then tells how far these are.
+    """
+    for thing in things:
+        met = thing.meet(x, z, rays)
+        closer = met.distance < distance[met.rays]
+        distance[met.rays[closer]] = met.distance[closer]
+        yield met.rays[closer], met.color[closer]
 
 
 def _sampled(texture: np.ndarray, across: np.ndarray, down: np.ndarray, tile_m: float):

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from raycast import Cylinder, Wall
-from worlds import random_world
+from raycast import Cylinder, Wall, nearer
+from worlds import cut, random_world
 
 FOCAL_PX = 215.0
 """Of a panorama from 640x480 px, 170 degrees."""
@@ -88,11 +88,8 @@ class RoomScene:
         if behind is None:
             behind = np.zeros(rays.shape, np.uint8), np.full(len(rays), np.inf, np.float32)
         color, distance = (c.copy() for c in behind)
-        for thing in things:
-            met = thing.meet(x, z, rays)
-            nearer = met.distance < distance[met.rays]
-            color[met.rays[nearer]] = met.color[nearer]
-            distance[met.rays[nearer]] = met.distance[nearer]
+        for met, seen in nearer(things, x, z, rays, distance):
+            color[met] = seen
         return color, distance
 
     def _room(self, rng) -> list:
@@ -155,11 +152,7 @@ def _reduced(values: np.ndarray) -> np.ndarray:
 
 
 def _plaster(rng) -> np.ndarray:
-    """Cut a grey texture, (512, 512, 3) uint8, out of the worlds of the benchmarks."""
-    world = _world()
-    y, x = (rng.integers(0, size - 512) for size in world.shape)
-    part = cv2.normalize(world[y : y + 512, x : x + 512], None, 50, 210, cv2.NORM_MINMAX)
-    return cv2.merge([part] * 3)
+    return cut(_world(), rng, 512, 50, 210)
 
 
 @cache

@@ -10,8 +10,8 @@ from functools import cache
 
 import cv2
 import numpy as np
-from raycast import Cylinder, Wall
-from worlds import random_world
+from raycast import Cylinder, Wall, nearer
+from worlds import cut, random_world
 
 from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.lens import Lens
@@ -127,11 +127,8 @@ class TurnScene:
         x, _, z = turn @ (camera.place_m[0], 0.0, camera.place_m[1])
         light = _sky(world) if not self.place.ceiling_m else np.zeros(len(world), np.float32)
         nearest = np.full(len(world), np.inf, np.float32)
-        for thing in (*self._things, *moving):
-            met = thing.meet(x, z, world)
-            closer = met.distance < nearest[met.rays]
-            light[met.rays[closer]] = met.color[closer, 0]
-            nearest[met.rays[closer]] = met.distance[closer]
+        for met, color in nearer((*self._things, *moving), x, z, world, nearest):
+            light[met] = color[:, 0]
         picture = np.zeros(seen.shape, np.float32)
         picture[seen] = light
         picture = cv2.GaussianBlur(picture, (0, 0), 0.6)
@@ -195,11 +192,7 @@ def _sky(rays: np.ndarray) -> np.ndarray:
 
 
 def _texture(rng) -> np.ndarray:
-    """Cut a texture, (1024, 1024, 3) uint8, grey, out of the worlds of the benchmarks."""
-    world = _world()
-    y, x = (rng.integers(0, size - _TEXTURE_PX) for size in world.shape)
-    part = world[y : y + _TEXTURE_PX, x : x + _TEXTURE_PX]
-    return cv2.merge([cv2.normalize(part, None, 40, 220, cv2.NORM_MINMAX)] * 3)
+    return cut(_world(), rng, _TEXTURE_PX, 40, 220)
 
 
 @cache

@@ -18,6 +18,13 @@ def random_world(rng, style: str) -> np.ndarray:
     return (low + world * ((high - low) / max(float(world.max()), 1e-6))).clip(1, 255)
 
 
+def cut(world: np.ndarray, rng, size_px: int, low: int, high: int) -> np.ndarray:
+    """Cut a grey texture (size_px, size_px, 3) from `low` to `high` out of a world of uint8."""
+    y, x = (rng.integers(0, side - size_px) for side in world.shape)
+    part = world[y : y + size_px, x : x + size_px]
+    return cv2.merge([cv2.normalize(part, None, low, high, cv2.NORM_MINMAX)] * 3)
+
+
 def _blank(rng):
     rows = np.linspace(0, 1, WORLD_WIDTH // 2, dtype=np.float32)[:, None]
     return np.repeat(rows * rng.uniform(-60, 60), WORLD_WIDTH, axis=1)
