@@ -11,6 +11,7 @@ import pytest
 from field import START_S, UNNOTICED_S
 from sensor_msgs.msg import Image
 
+from fisheye_testing.domains import ports
 from fisheye_testing.image_message import stamp_ns
 from fisheye_testing.waiting import wait_for
 
@@ -56,13 +57,6 @@ def test_no_killed_node_stays_deaf(five):
         )
     anew = sum(five.log(node).read_text().count('connecting anew') for node in five.processes)
     print(f'\nnodes connected anew {anew} times')
-
-
-def ports(domain):
-    """Return the files through which Fast DDS hands data to the nodes of a domain."""
-    first = 7400 + 250 * domain
-    files = Path('/dev/shm').glob('fastrtps_port*[0-9]')
-    return {f for f in files if first <= int(f.name.removeprefix('fastrtps_port')) < first + 250}
 
 
 @pytest.mark.parametrize('others', [(), ('right/capture',)], ids=['alone', 'beside others'])

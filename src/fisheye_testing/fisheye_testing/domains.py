@@ -38,16 +38,21 @@ def locked_domain() -> tuple[int, IO[str]]:
     raise RuntimeError('every ROS domain from 1 to 100 is in use by a test')
 
 
+def ports(domain: int) -> set[Path]:
+    """Return the files through which Fast DDS hands data to the nodes of a domain."""
+    first = _FIRST_PORT + _PORTS * domain
+    files = (_SHARED_MEMORY / f'fastrtps_port{first + number}' for number in range(_PORTS))
+    return {file for file in files if file.exists()}
+
+
 def _clear(domain: int) -> None:
     """Remove the ports of Fast DDS in shared memory that nobody listens at any more.
 
     A node that opens one of them may find it broken, and is deaf.
     """
-    first = _FIRST_PORT + _PORTS * domain
-    for number in range(first, first + _PORTS):
-        port = _SHARED_MEMORY / f'fastrtps_port{number}'
+    for port in ports(domain):
         locks = (port.with_name(port.name + kind) for kind in ('_el', '_sl'))
-        if port.exists() and not any(map(_is_locked, locks)):
+        if not any(map(_is_locked, locks)):
             port.unlink(missing_ok=True)
 
 
