@@ -7,6 +7,8 @@ import rclpy
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from tf2_msgs.msg import TFMessage
 
+from fisheye_bridge.stamps import ns_of
+
 
 def main(topic: str, count: int) -> None:
     """Listen until so many messages came."""
@@ -29,11 +31,10 @@ def main(topic: str, count: int) -> None:
 def described(transform) -> dict:
     """Return frames, stamp and rotation."""
     q = transform.transform.rotation
-    stamp = transform.header.stamp
     return {
         'parent': transform.header.frame_id,
         'child': transform.child_frame_id,
-        'stamp_ns': stamp.sec * 10**9 + stamp.nanosec,
+        'stamp_ns': ns_of(transform.header.stamp),
         'rotation': [q.x, q.y, q.z, q.w],
     }
 
