@@ -7,7 +7,6 @@ time is read back from what the page has drawn, from screenshots and from a subs
 
 import argparse
 import json
-import re
 import subprocess
 import sys
 import tempfile
@@ -82,7 +81,7 @@ def measure(quality: LinkQuality | None, kind: str, seconds: float, has_cut: boo
     ):
         at_robot, at_base = (link.robot.prefix, link.base.prefix) if link else ((), ())
         start(rig, at_robot, is_far=link is not None)
-        url = wait_for(lambda: address(rig), _START_S, 'the address')
+        url = rig.page_url(_START_S)
         watched = [*at_robot, sys.executable, __file__, '--watch', str(domain)]
         told = subprocess.run([*watched, '--seconds', str(seconds / 3)], stdout=subprocess.PIPE)
         subscriber = json.loads(told.stdout)
@@ -113,13 +112,6 @@ def start(rig: RigProcesses, prefix: tuple[str, ...], *, is_far: bool) -> None:
         command = [*prefix, sys.executable, str(_HERE / 'timed_node.py'), node]
         options = [part for word in words for part in ('-p', word)]
         rig.run(node, [*command, str(stage_file(rig, node)), '--ros-args', *options])
-
-
-def address(rig: RigProcesses) -> str:
-    """Return what the viewer says that it serves at; '' so far."""
-    rig.check_alive()
-    said = re.search(r'the panorama is at (\S+)', rig.log('viewer').read_text())
-    return said[1] if said else ''
 
 
 def stage_file(rig: RigProcesses, node: str) -> Path:

@@ -15,6 +15,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from fisheye_msgs.msg import Projection
 from nodding import GROUND, MOUNTS, NOD_RAD, SKY, Drive, nod
 from sensor_msgs.msg import Image
+from viewer_page import page_of
 
 from fisheye_bridge.stamps import ns_of
 from fisheye_geometry.attitude import angle_between, attitude_of
@@ -65,14 +66,14 @@ def test_a_drive_over_bumps(rig, watcher, domain, browser, seen, tmp_path, has_o
             **{f'{side}.source': 'topic' for side in MOUNTS},
             **{'front.stabilise': True},
         )
-        rig.start('viewer', port=0)
         wait_for(
             lambda: rig.check_alive() or (watcher.is_measured and has_settled(seen)),
             START_S,
             'a measured rig that is laid out for good',
         )
         seen['projections'].clear()
-        page(browser, rig)
+        page = page_of(rig, browser, width=1600, height=1000)
+        page.until(lambda: 'Live' in page.text('condition'), 'a live page')
         stays = Stays()
         wait_for(lambda: stays(page_error_deg(browser, watcher)), START_S, 'a level page')
         wait_for(lambda: views_are_level(seen), START_S, 'level views')
@@ -136,18 +137,6 @@ def check_orientations(projections):
     errors = np.degrees(np.arccos(np.clip(((trues @ laid.T) * downs).sum(axis=1), -1, 1)))
     assert np.median(errors) < LEVEL_DEG
     assert np.degrees(angle_between(laid, np.eye(3))) < 2 * np.degrees(NOD_RAD)
-
-
-def page(browser, rig):
-    found = wait_for(
-        lambda: re.search(r'http://127\.0\.0\.1:\d+/', rig.log('viewer').read_text()), START_S
-    )
-    size = {'width': 1600, 'height': 1000, 'deviceScaleFactor': 1, 'mobile': False}
-    browser.execute_cdp_cmd('Emulation.setDeviceMetricsOverride', size)
-    browser.get(found[0])
-    wait_for(
-        lambda: 'Live' in browser.find_element('id', 'condition').text, START_S, 'a live page'
-    )
 
 
 def whole(browser):

@@ -1,7 +1,6 @@
 """The viewer's page in a browser, as a person sees and uses it, and pictures to show on it."""
 
 import math
-import re
 import threading
 from concurrent.futures import Future
 
@@ -127,15 +126,10 @@ def serve():
     assert not faults
 
 
-def page_of(rig, browser):
+def page_of(rig, browser, **size):
     """Start the viewer beside a rig and open its page."""
     rig.start('viewer', port=0)
-    said = wait_for(
-        lambda: rig.check_alive() or re.search(r'http://\S+', rig.log('viewer').read_text()),
-        DEADLINE_S,
-        'the address',
-    )
-    return Page(browser, said[0])
+    return Page(browser, rig.page_url(DEADLINE_S), **size)
 
 
 def aside_deg(bearing_deg, other_deg):

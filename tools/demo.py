@@ -2,7 +2,6 @@
 
 import argparse
 import math
-import re
 import sys
 import time
 from pathlib import Path
@@ -59,12 +58,8 @@ def main() -> int:
 def view(rig: RigProcesses, host: str, robot: dict[str, float]) -> None:
     """Show the panorama in browsers until Ctrl-C."""
     rig.start('viewer', host=host, **robot)
-    address = wait_for(
-        lambda: rig.check_alive() or re.search(r'http://\S+', rig.log('viewer').read_text()),
-        START_TIMEOUT_S,
-        'the start of the viewer',
-    )
-    print(f'The panorama is at {address[0]} in a browser. Ctrl-C ends it.', flush=True)
+    address = rig.page_url(START_TIMEOUT_S)
+    print(f'The panorama is at {address} in a browser. Ctrl-C ends it.', flush=True)
     try:
         while True:
             rig.check_alive()

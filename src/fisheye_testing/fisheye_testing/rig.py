@@ -10,6 +10,8 @@ from pathlib import Path
 
 from ament_index_python.packages import get_package_prefix
 
+from fisheye_testing.waiting import wait_for
+
 EXECUTABLES = {
     'capture': 'fisheye_capture',
     'undistort': 'fisheye_undistort',
@@ -130,6 +132,16 @@ class RigProcesses:
             if process.poll() is not None:
                 words = self.log(node).read_text(errors='replace').strip()[-2000:]
                 raise RuntimeError(f'{node} ended with code {process.returncode}:\n{words}')
+
+    def page_url(self, timeout_s: float) -> str:
+        """Wait until the viewer says where it serves the panorama, and return that address."""
+
+        def said() -> str | None:
+            self.check_alive()
+            found = re.search(r'the panorama is at (\S+)', self.log('viewer').read_text())
+            return found and found[1]
+
+        return str(wait_for(said, timeout_s, 'the address of the page'))
 
     def last_warnings(self) -> str:
         """Return the last warning of each node that gave one, and where all are."""
