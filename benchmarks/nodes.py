@@ -32,6 +32,7 @@ FULL_SPEED_HZ = 1000.0
 ONE_CORE = ('taskset', '--cpu-list', '0')
 START_TIMEOUT_S = 60.0
 SETTLE_S = 2.0
+"""Of the run, left out before what is counted: nothing of the start is in it."""
 _TICKS_PER_S = os.sysconf('SC_CLK_TCK')
 
 
@@ -236,6 +237,7 @@ def run_rig(setup: Setup, seconds: float, log_folder: Path) -> Run:
             watcher.calibrate()
         calibration_s = time.monotonic() - begin
         views = [ViewRate(watcher, view) for view in setup.views if setup.are_watched]
+        wait_for(lambda: all(view.count for view in views), START_TIMEOUT_S, 'all views')
         time.sleep(SETTLE_S)
         watcher.restart()
         for view in views:
