@@ -56,7 +56,7 @@ def message(watcher):
 
 def check_panorama(rig, watcher):
     wait_for(
-        lambda: rig.check_alive() or (watcher.overlaps and watcher.overlaps.overlaps[0].method),
+        lambda: rig.check_alive() or watcher.is_measured,
         START_S,
         'an overlap',
     )
