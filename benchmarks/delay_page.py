@@ -8,14 +8,12 @@ PLACES is JSON: the row and the columns of the painted blocks, as shares of the 
 
 import base64
 import json
-import os
-import shutil
 import sys
 import time
 
 import cv2
 import numpy as np
-from selenium import webdriver
+from chromium import chromium
 
 from fisheye_testing.painted_time import WRAP_MS, age_ms, read
 from fisheye_testing.waiting import wait_for
@@ -74,7 +72,7 @@ def main() -> None:
     """Look at the page, and print."""
     url, seconds, kind, places = sys.argv[1:]
     row, columns = json.loads(places)
-    driver = chromium()
+    driver = chromium('disable-gpu', 'window-size=1300,800')
     try:
         probe = _PROBE.replace('TAKE_AWAY', str(kind == 'jpeg').lower())
         probe += f'window.row = {row}; window.columns = {columns};'
@@ -94,18 +92,6 @@ def main() -> None:
         print(json.dumps(answer), flush=True)
     finally:
         driver.quit()
-
-
-def chromium() -> webdriver.Chrome:
-    """Start Chromium; it trusts the certificate of the viewer."""
-    options = webdriver.ChromeOptions()
-    options.binary_location = shutil.which('chromium')
-    for switch in ('headless=new', 'disable-gpu', 'window-size=1300,800'):
-        options.add_argument(f'--{switch}')
-    if os.geteuid() == 0:
-        options.add_argument('--no-sandbox')
-    options.accept_insecure_certs = True
-    return webdriver.Chrome(options, webdriver.ChromeService(shutil.which('chromedriver')))
 
 
 def painted(picture: dict) -> dict:

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import hypothesis
 import pytest
+from chromium import chromium
 from field import Field
-from selenium import webdriver
 
 from fisheye_testing.data import real_data
 from fisheye_testing.domains import unused_domain
@@ -74,18 +74,14 @@ def browser(tmp_path_factory):
         if os.environ.get('REQUIRE_BROWSER') == '1':
             pytest.fail(message)
         pytest.skip(message)
-    options = webdriver.ChromeOptions()
-    options.binary_location = shutil.which('chromium')
-    for switch in ('headless=new', 'hide-scrollbars', 'use-angle=swiftshader'):
-        options.add_argument(f'--{switch}')
-    # A machine without a graphics card still draws WebGL; root cannot have Chromium's sandbox.
-    options.add_argument('--enable-unsafe-swiftshader')
-    if os.geteuid() == 0:
-        options.add_argument('--no-sandbox')
-    options.accept_insecure_certs = True
     downloads = tmp_path_factory.mktemp('downloads')
-    options.add_experimental_option('prefs', {'download.default_directory': str(downloads)})
-    driver = webdriver.Chrome(options, webdriver.ChromeService(shutil.which('chromedriver')))
+    # A machine without a graphics card still draws WebGL.
+    driver = chromium(
+        'hide-scrollbars',
+        'use-angle=swiftshader',
+        'enable-unsafe-swiftshader',
+        preferences={'download.default_directory': str(downloads)},
+    )
     driver.downloads = downloads
     yield driver
     driver.quit()
