@@ -25,7 +25,7 @@ test: build ## run every test: those of each package, then those across packages
 test-faults: build ## only the tests of cables pulled, cameras gone and files broken (LONG=1: longer)
 	@$(run) python -m pytest -s test/test_faults*.py $(ARGS)
 
-bench: build ## measure rates and delays (also bench-overlap, bench-calibration, bench-turn, bench-network, bench-pairing, bench-quality)
+bench: build ## measure rates and delays (also bench-overlap, bench-turn, bench-video ...: benchmarks/README.md)
 	@$(run) python benchmarks/bench.py $(ARGS)
 
 bench-%: build
