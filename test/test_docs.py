@@ -9,7 +9,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 PAGES = [
     page
-    for pattern in ('*.md', 'docs/*.md', 'examples/*.md')
+    for pattern in ('*.md', 'docs/*.md', 'examples/*.md', 'benchmarks/*.md')
     for page in sorted(ROOT.glob(pattern))
 ]
 
