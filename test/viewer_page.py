@@ -17,6 +17,7 @@ from panorama_viewer.settings import ViewerSettings
 
 DEADLINE_S = 60.0
 SPOT_DEG = 1.5
+CLOSE_DEG = 1.0
 SURFACES = [
     Surface('cylindrical', 1300, 560, 240.0, 640.0, 260.0),
     Surface('equirectangular', 1300, 480, 240.0, 640.0, 240.0),

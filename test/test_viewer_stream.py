@@ -1,0 +1,195 @@
+"""How pictures come to the viewer's page: as H.264 or JPEG, how late, and after a cut."""
+
+import socket
+import threading
+from contextlib import closing, suppress
+from urllib.parse import urlsplit
+
+import pytest
+import viewer_page
+from viewer_page import CLOSE_DEG, MAGENTA, SURFACES, Page, painted, patch
+
+from fisheye_geometry.surface import Surface
+from panorama_viewer.address import is_loopback, reachable
+from panorama_viewer.certificate import tls_of
+from panorama_viewer.settings import ViewerSettings
+
+serve = viewer_page.serve  # its fixture
+
+
+@pytest.fixture
+def before_the_page(browser):
+    """Return a function that has JavaScript run in every page before the page's own."""
+    scripts = []
+
+    def add(source):
+        answer = browser.execute_cdp_cmd(
+            'Page.addScriptToEvaluateOnNewDocument', {'source': source}
+        )
+        scripts.append(answer)
+
+    yield add
+    for script in scripts:
+        browser.execute_cdp_cmd('Page.removeScriptToEvaluateOnNewDocument', script)
+
+
+def format_of(page):
+    """Return how pictures come, and what stands in the way of H.264."""
+    page.until(lambda: page.text('condition') == 'Live', 'a live picture')
+    return page.text('format'), page.find('format').get_attribute('title')
+
+
+@pytest.mark.parametrize('size', [(1300, 560), (1301, 561)], ids=['even', 'odd'])
+def test_h264_shows_what_was_painted_where_it_is(browser, serve, size):
+    surface = Surface('cylindrical', *size, 240.0, 640.0, 260.0)
+    for bearing_deg in (-120.0, 0.0, 140.0):
+        server = serve(surface, painted(surface, bearing_deg, 12.0))
+        page = Page(browser, server.url)
+        assert format_of(page) == ('H.264', '')
+        shown_deg = page.point('whole', *patch(page, 'whole', MAGENTA).mean(axis=0))
+        assert shown_deg == pytest.approx(bearing_deg, abs=CLOSE_DEG)
+
+
+@pytest.mark.parametrize(
+    ('script', 'reason'),
+    [
+        ('delete window.VideoDecoder', 'this browser has no WebCodecs'),
+        (
+            'VideoDecoder.isConfigSupported = async () => ({ supported: false })',
+            'this browser does not decode H.264',
+        ),
+        (
+            'VideoDecoder.prototype.decode = () => { throw new Error("worn out"); }',
+            'this browser failed to decode H.264: worn out',
+        ),
+    ],
+)
+def test_a_browser_that_cannot_show_h264_shows_jpeg_and_says_why(
+    browser, serve, before_the_page, script, reason
+):
+    before_the_page(script)
+    server = serve(SURFACES[0], painted(SURFACES[0], 31.0, 12.0))
+    page = Page(browser, server.url)
+    page.until(lambda: page.text('format') == 'JPEG', 'JPEG')
+    assert format_of(page) == ('JPEG', reason)
+    page.find('format').click()
+    page.until(lambda: page.text('answer') == reason, 'the reason in words')
+    shown_deg = page.point('whole', *patch(page, 'whole', MAGENTA).mean(axis=0))
+    assert shown_deg == pytest.approx(31.0, abs=CLOSE_DEG)
+
+
+def test_a_picture_that_cannot_be_decoded_is_made_good_by_a_keyframe(
+    browser, serve, before_the_page
+):
+    before_the_page("""
+        const plain = VideoDecoder.prototype.decode;
+        window.decoded = [];
+        VideoDecoder.prototype.decode = function decode(chunk) {
+          decoded.push(chunk.type);
+          if (decoded.length === 5) throw new Error('once');
+          plain.call(this, chunk);
+        };
+    """)
+    server = serve(SURFACES[0], painted(SURFACES[0], 31.0, 12.0))
+    page = Page(browser, server.url)
+    page.until(lambda: len(browser.execute_script('return decoded')) > 8, 'more pictures')
+    kinds = browser.execute_script('return decoded')
+    assert kinds[:7] == ['key', 'delta', 'delta', 'delta', 'delta', 'key', 'delta']
+    assert format_of(page) == ('H.264', '')
+
+
+@pytest.mark.parametrize('is_encrypted', [False, True])
+def test_other_machines_need_https_for_h264(browser, serve, is_encrypted, tmp_path, monkeypatch):
+    monkeypatch.setenv('ROS_HOME', str(tmp_path))
+    tls = tls_of(ViewerSettings(https=is_encrypted), ())
+    if is_loopback(reachable('0.0.0.0')):
+        pytest.skip('this machine has no address but its own')
+    server = serve(SURFACES[0], painted(SURFACES[0], 31.0, 12.0), tls=tls, host='0.0.0.0')
+    page = Page(browser, server.url)
+    expected = ('H.264', '') if is_encrypted else ('JPEG', 'this page was not opened by https')
+    assert format_of(page) == expected
+
+
+class SilentRelay:
+    """A way to a port on which nothing comes through for a while, without a word to either end."""
+
+    def __init__(self, port):
+        self._target, self._is_cut = ('127.0.0.1', port), False
+        self._listener = socket.create_server(('127.0.0.1', 0))
+        self.port = self._listener.getsockname()[1]
+        self._sockets = [self._listener]
+        self._run(self._accept)
+
+    def close(self):
+        for each in self._sockets:
+            with suppress(OSError):
+                each.shutdown(socket.SHUT_RDWR)
+            each.close()
+
+    def cut(self):
+        """Carry nothing from now on: neither what is open nor what comes."""
+        self._is_cut = True
+
+    def mend(self):
+        """Carry what comes new."""
+        self._is_cut = False
+
+    def _run(self, work, *arguments):
+        threading.Thread(target=work, args=arguments, daemon=True).start()
+
+    def _accept(self):
+        with suppress(OSError):
+            while True:
+                near, _ = self._listener.accept()
+                self._sockets.append(near)
+                if not self._is_cut:
+                    far = socket.create_connection(self._target)
+                    self._sockets.append(far)
+                    self._run(self._carry, near, far)
+                    self._run(self._carry, far, near)
+
+    def _carry(self, source, target):
+        with suppress(OSError):
+            while data := source.recv(65536):
+                if self._is_cut:
+                    return
+                target.sendall(data)
+        if not self._is_cut:
+            with suppress(OSError):  # also where the other end broke off
+                target.shutdown(socket.SHUT_WR)
+
+
+def test_the_page_comes_back_by_itself_when_its_link_was_silent(browser, serve):
+    server = serve(SURFACES[0], painted(SURFACES[0], 0, 0))
+    with closing(SilentRelay(urlsplit(server.url).port)) as relay:
+        page = Page(browser, f'http://127.0.0.1:{relay.port}/')
+        page.until(lambda: page.text('condition') == 'Live', 'a live picture')
+        relay.cut()
+        page.until(lambda: 'no connection' in page.text('veil'), 'the loss')
+        relay.mend()
+        page.until(lambda: page.text('condition') == 'Live', 'a live picture')
+        assert page.text('format') == 'H.264'
+
+
+def test_the_delay_is_told_and_coloured(browser, serve):
+    server = serve(SURFACES[0], painted(SURFACES[0], 0, 0))
+    page = Page(browser, server.url)
+    page.until(lambda: page.text('condition') == 'Live', 'a live picture')
+    for delay_ms, level in ((-5000, ''), (200, 'warning'), (5000, 'error'), (-5000, '')):
+        server.tell(delay_ms=delay_ms)
+        page.until(
+            lambda level=level: page.find('delay').get_attribute('data-level') == level,
+            f'{delay_ms} ms as {level or "good"}',
+        )
+
+
+def test_a_picture_that_stands_still_is_seen_to(browser, serve):
+    server = serve(SURFACES[0], painted(SURFACES[0], 0, 0), stale_after_s=0.5)
+    page = Page(browser, server.url)
+    page.until(lambda: page.text('condition') == 'Live', 'a live picture')
+    assert not page.find('veil').is_displayed()
+    server.fall_silent()
+    page.until(lambda: page.find('veil').is_displayed(), 'a veil')
+    page.until(lambda: page.text('veil') == 'No picture for 1 s', 'the age')
+    server.stop()
+    page.until(lambda: 'no connection' in page.text('veil'), 'the loss of the connection')
