@@ -14,7 +14,7 @@ from fisheye_undistort.detect.pictures import read_pictures
 from fisheye_undistort.fit.calibration import calibrate
 from fisheye_undistort.fit.circle_bias import center_bias
 from fisheye_undistort.fit.estimate import Estimate, TargetView
-from fisheye_undistort.fit.sheet_model import warp_board
+from fisheye_undistort.fit.sheet_model import intrinsics_of, warp_board
 from fisheye_undistort.fit.turned_views import turned
 from fisheye_undistort.report.misfit import misfit_of
 from fisheye_undistort.target.target import STANDARD, Target
@@ -188,18 +188,7 @@ def test_a_lens_that_is_no_fisheye_of_ours_leaves_what_is_told():
 
 
 def test_the_bias_is_that_of_a_photograph(paper_lens, paper_poses, paper_pictures):
-    unknowns = np.array(
-        [
-            paper_lens.focal_x_px,
-            paper_lens.focal_y_px,
-            paper_lens.center_x_px,
-            paper_lens.center_y_px,
-            *paper_lens.distortion,
-            0,
-            0,
-            0,
-        ]
-    )
+    unknowns = np.concatenate([intrinsics_of(paper_lens), np.zeros(3)])
     found_px = 0.05
     """What blur and noise leave of a centre of mass."""
     for pose, picture in zip(paper_poses[:4], paper_pictures, strict=False):

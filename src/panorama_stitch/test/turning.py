@@ -7,6 +7,7 @@ import numpy as np
 
 from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.lens import FisheyeLens
+from fisheye_undistort.fit.sheet_model import intrinsics_of
 from panorama_stitch.turn.sightings import Sightings
 from panorama_stitch.turn.turn_state import TurnState
 
@@ -59,10 +60,8 @@ def turn_truth(off_m: float, landmarks: int = 300, frames: int = 40) -> TurnStat
     rng = np.random.default_rng(1)
     directions = rng.normal(size=(landmarks, 3)) * (1, 0.5, 1)
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    lens = turning_lens()
-    unknowns = [*lens.matrix[[0, 1, 0, 1], [0, 1, 2, 2]], *lens.distortion]
     return TurnState(
-        np.array([unknowns] * 2),
+        np.array([intrinsics_of(turning_lens())] * 2),
         np.array([mount.matrix for mount in mounts()]),
         off_m * np.array([[-0.6, 0.0, 0.8], [0.6, 0.02, 0.8]]),
         np.linspace(0, np.radians(372), frames),

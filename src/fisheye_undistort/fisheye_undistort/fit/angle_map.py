@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from fisheye_geometry.lens import FisheyeLens, Lens
-from fisheye_undistort.fit.sheet_model import INTRINSICS, project
+from fisheye_undistort.fit.sheet_model import INTRINSICS, intrinsics_of, project
 
 _COLUMNS, _ROWS = 40, 30
 _LIT_LEVEL = 16
@@ -71,11 +71,11 @@ class AngleMap:
     slopes: np.ndarray
 
     @classmethod
-    def of(cls, lens: FisheyeLens, unknowns: np.ndarray) -> 'AngleMap':
-        """Return the map of a lens with unknowns (8,) or more."""
+    def of(cls, lens: FisheyeLens) -> 'AngleMap':
+        """Return the map of a lens."""
         pixels = picture_grid((lens.width, lens.height))
         rays, seen = lens.unproject(pixels)
-        _, by_intrinsics, by_ray = project(unknowns, rays.reshape(-1, 3))
+        _, by_intrinsics, by_ray = project(intrinsics_of(lens), rays.reshape(-1, 3))
         # Where the lens ends its radius stands still: nothing is known of the angle there.
         slopes = -np.linalg.pinv(by_ray, rcond=1e-9) @ by_intrinsics
         return cls(pixels, rays, seen, slopes.reshape(*seen.shape, 3, len(INTRINSICS)))

@@ -75,7 +75,7 @@ class Calibration:
     @cached_property
     def angles(self) -> AngleMap:
         """Rays of the lens over its picture."""
-        return AngleMap.of(self.lens, self.estimate.unknowns)
+        return AngleMap.of(self.lens)
 
     @property
     def directions_rad(self) -> tuple[np.ndarray, np.ndarray]:
@@ -146,8 +146,7 @@ def _calibrate(fitter: ModelFitter, lit: np.ndarray | None) -> Calibration:
     if deviation_px > _MAX_FOCAL_DEVIATION * focal_px or focal_px > longest_px:
         raise CalibrationError(f'the focal length is {focal_px:.0f} +- {deviation_px:.0f} px')
     lens = lens_of(estimate.unknowns, fitter.size)
-    everywhere = np.ones(AngleMap.of(lens, estimate.unknowns).seen.shape, bool)
-    halves = cross_validate(fitter, estimate, everywhere if lit is None else lit)
+    halves = cross_validate(fitter, estimate, lit)
     return Calibration(
         lens,
         estimate,

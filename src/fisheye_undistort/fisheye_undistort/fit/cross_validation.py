@@ -39,7 +39,7 @@ class Halves:
         return difference_rad(self.lenses[0], self.lenses[1], pixels, turned=True)[0]
 
 
-def cross_validate(fitter: ModelFitter, whole: Estimate, lit: np.ndarray) -> Halves | None:
+def cross_validate(fitter: ModelFitter, whole: Estimate, lit: np.ndarray | None) -> Halves | None:
     """Fit the even and the odd views apart; None where there are too few.
 
     Parameters
@@ -49,7 +49,7 @@ def cross_validate(fitter: ModelFitter, whole: Estimate, lit: np.ndarray) -> Hal
     whole
         What it found.
     lit
-        (30, 40) bool, the part of the picture that counts.
+        (30, 40) bool, the part of the picture that counts; None: all of it.
     """
     count = len(fitter.views)
     if count < _FEWEST:
@@ -61,10 +61,12 @@ def cross_validate(fitter: ModelFitter, whole: Estimate, lit: np.ndarray) -> Hal
         _held_out(fitter, whole, some, estimate)
         for some, estimate in zip(parts, reversed(estimates), strict=True)
     ]
-    angles = AngleMap.of(lens_of(whole.unknowns, fitter.size), whole.unknowns)
+    angles = AngleMap.of(lens_of(whole.unknowns, fitter.size))
     apart, _ = difference_rad(even, odd, angles.pixels, turned=False)
     promised = angles.deviation_rad(estimates[0].covariance + estimates[1].covariance)
-    use = lit & np.isfinite(apart + promised) & (promised > 0)
+    use = np.isfinite(apart + promised) & (promised > 0)
+    if lit is not None:
+        use &= lit
     ratio = float(np.sqrt(np.mean((apart[use] / promised[use]) ** 2))) if use.any() else 1.0
     return Halves((even, odd), rms(np.concatenate(errors)), max(1.0, ratio))
 

@@ -18,6 +18,12 @@ def lens_of(unknowns: np.ndarray, size: tuple[int, int]) -> FisheyeLens:
     return FisheyeLens(*size, focal_x, focal_y, center_x, center_y, tuple(distortion))
 
 
+def intrinsics_of(lens: FisheyeLens) -> np.ndarray:
+    """Return the unknowns (8,) of a lens, in the order of `INTRINSICS`."""
+    focal, center = (lens.focal_x_px, lens.focal_y_px), (lens.center_x_px, lens.center_y_px)
+    return np.array([*focal, *center, *lens.distortion])
+
+
 def to_camera(pose: np.ndarray, points_mm: np.ndarray) -> np.ndarray:
     """Points (..., 3) of the target in the camera's frame, for one pose (6,)."""
     return points_mm @ cv2.Rodrigues(pose[:3])[0].T + pose[3:]

@@ -9,6 +9,7 @@ from scipy.optimize import brentq
 from fisheye_core.errors import CalibrationError
 from fisheye_geometry.attitude import Attitude, rotation_vector
 from fisheye_geometry.lens import FisheyeLens
+from fisheye_undistort.fit.sheet_model import intrinsics_of
 from panorama_stitch.turn.expectation import NEARNESS
 from panorama_stitch.turn.sightings import Sightings
 from panorama_stitch.turn.turn_state import TurnState, in_world
@@ -113,9 +114,7 @@ def first_state(
     lenses = [_scaled(camera.lens, focal_share) for camera in cameras]
     attitudes = np.array([_upright(down) for down in downs])
     return TurnState(
-        np.array(
-            [[*lens.matrix[[0, 1, 0, 1], [0, 1, 2, 2]], *lens.distortion] for lens in lenses]
-        ),
+        np.array([intrinsics_of(lens) for lens in lenses]),
         attitudes,
         np.zeros((len(cameras), 3)),
         angles,
