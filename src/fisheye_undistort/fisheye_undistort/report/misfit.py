@@ -9,7 +9,18 @@ from fisheye_undistort.fit.calibration import Calibration
 
 RING_DEG = 10
 """Width of the rings about the axis."""
-SECTORS = 8
+DIRECTIONS = (
+    'to the right',
+    'to the bottom right',
+    'to the bottom',
+    'to the bottom left',
+    'to the left',
+    'to the top left',
+    'to the top',
+    'to the top right',
+)
+"""Where the sectors lie in the picture."""
+SECTORS = len(DIRECTIONS)
 
 _FEWEST_VIEWS = 4
 """Views that must have points in a cell before it says anything."""

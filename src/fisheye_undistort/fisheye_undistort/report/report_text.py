@@ -10,22 +10,11 @@ import numpy as np
 from fisheye_undistort.fit.estimate import rms
 from fisheye_undistort.fit.sheet_model import INTRINSICS
 from fisheye_undistort.report.certainty import LIMIT_DEG
-from fisheye_undistort.report.misfit import RING_DEG, SECTORS
+from fisheye_undistort.report.misfit import DIRECTIONS, RING_DEG, SECTORS
 
 if TYPE_CHECKING:
     from fisheye_undistort.report.report import CalibrationReport
 
-_DIRECTIONS = (
-    'to the right',
-    'to the bottom right',
-    'to the bottom',
-    'to the bottom left',
-    'to the left',
-    'to the top left',
-    'to the top',
-    'to the top right',
-)
-"""Where the sectors lie in the picture."""
 _BAR = 30
 
 
@@ -90,7 +79,7 @@ def _misfit(report: CalibrationReport) -> str:
     return (
         f'Kannala-Brandt leaves {misfit.typical_px:.3f} px that all views share, most '
         f'({size_px:.2f} px, {size_deg:.3f} degrees) at {ring}-{ring + RING_DEG} degrees '
-        f'{_DIRECTIONS[misfit.sector[at]]}'
+        f'{DIRECTIONS[misfit.sector[at]]}'
     )
 
 

@@ -2,15 +2,12 @@
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from fisheye_geometry.lens import FisheyeLens
-from fisheye_undistort.fit.sheet_model import project
+from fisheye_undistort.fit.angle_map import AngleMap, lit_part
+from fisheye_undistort.report.misfit import DIRECTIONS, sector_of
 
-_COLUMNS, _ROWS = 33, 25
-_DARK_LEVEL = 16
-"""Below it the sensor is not lit, grey levels."""
 _MIDDLE = 0.5
 """Of the angle at the edge: what is within is not near any edge."""
 
@@ -58,28 +55,16 @@ class LensAngles:
         brightest
             (height, width) uint8, the brightest that each pixel was.
         """
-        x, y = (
-            np.linspace(0, side - 1, n)
-            for side, n in ((lens.width, _COLUMNS), (lens.height, _ROWS))
-        )
-        pixels = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-        rays, seen = lens.unproject(pixels)
-        light = cv2.blur(brightest, (5, 5))[tuple(np.rint(pixels[:, ::-1]).astype(int).T)]
-        seen &= light > _DARK_LEVEL
-        pixels, rays = pixels[seen], rays[seen]
-        unknowns = np.array([*lens.matrix[[0, 1, 0, 1], [0, 1, 2, 2]], *lens.distortion])
-        _, by_intrinsics, by_ray = project(unknowns, rays)
-        # What moves a pixel is made up for by the ray that moves it back.
-        slopes = -np.linalg.pinv(by_ray, rcond=1e-9) @ by_intrinsics
-        variance = np.einsum('nij,jk,nik->n', slopes, covariance, slopes)
-        one, other = (half.unproject(pixels)[0] for half in halves)
-        apart = np.linalg.norm(one - other, axis=1) / 2
-        x, y, z = rays.T
+        angles = AngleMap.of(lens)
+        seen = angles.seen & lit_part(brightest)
+        one, other = (half.unproject(angles.pixels)[0] for half in halves)
+        apart = np.linalg.norm(one - other, axis=-1) / 2
+        x, y, _ = angles.rays[seen].T
         return cls(
             lens,
-            np.arctan2(np.hypot(x, y), z),
+            angles.angle_rad[seen],
             np.arctan2(y, x),
-            np.maximum(np.sqrt(variance.clip(0)), apart),
+            np.maximum(angles.deviation_rad(covariance), apart)[seen],
         )
 
     @property
@@ -98,15 +83,5 @@ class LensAngles:
         worst = int(np.argmax(self.deviations))
         if self.angles[worst] < _MIDDLE * self.edge_rad:
             return 'in the middle'
-        sides = (
-            'right',
-            'lower right',
-            'bottom',
-            'lower left',
-            'left',
-            'upper left',
-            'top',
-            'upper right',
-        )
-        at = sides[round(self.azimuths[worst] / (np.pi / 4)) % len(sides)]
-        return f'{np.degrees(self.angles[worst]):.0f} degrees off the axis to the {at}'
+        direction = DIRECTIONS[sector_of(self.azimuths[worst])]
+        return f'{np.degrees(self.angles[worst]):.0f} degrees off the axis {direction}'
