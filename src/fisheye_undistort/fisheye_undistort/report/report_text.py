@@ -25,6 +25,13 @@ def report_lines(report: CalibrationReport) -> Iterator[str]:
     yield f'verdict  {report.verdict}'
 
 
+def unknown_lines(unknowns: np.ndarray, deviations: dict[str, float]) -> Iterator[str]:
+    """Return a line for each unknown, by the names in `deviations`."""
+    for (name, deviation), value in zip(deviations.items(), unknowns, strict=True):
+        digits = 3 if name not in INTRINSICS or name.endswith('px') else 6
+        yield f'  {name:14} {value:12.{digits}f}  +- {deviation:.{digits}f}'
+
+
 def _views(report: CalibrationReport):
     calibration = report.calibration
     yield f'target   {calibration.target}'
@@ -47,9 +54,7 @@ def _lens(report: CalibrationReport):
     yield f'lens     Kannala-Brandt, {calibration.lens.width} x {calibration.lens.height} px'
     if report.assumed:
         yield f'assumed  {", ".join(report.assumed)}: as with most lenses, the points tell less'
-    for (name, deviation), value in zip(deviations.items(), unknowns, strict=True):
-        digits = 3 if name not in INTRINSICS or name.endswith('px') else 6
-        yield f'  {name:14} {value:12.{digits}f}  +- {deviation:.{digits}f}'
+    yield from unknown_lines(unknowns, deviations)
 
 
 def _trust(report: CalibrationReport):

@@ -9,6 +9,7 @@ import numpy as np
 
 from fisheye_geometry.attitude import angle_between
 from fisheye_undistort.fit.sheet_model import INTRINSICS
+from fisheye_undistort.report.report_text import unknown_lines
 from panorama_stitch.turn.lens_angles import LensAngles
 from panorama_stitch.turn.rig_files import mounts_of
 from panorama_stitch.turn.turn_calibration import TurnCalibration
@@ -167,9 +168,9 @@ class TurnReport:
         ):
             yield f'{name:8} Kannala-Brandt, {lens.lens.width} x {lens.lens.height} px'
             told = self.deviations(camera)
-            for unknown, value in zip(INTRINSICS, fit.state.lenses[camera], strict=True):
-                digits = 3 if unknown.endswith('px') else 6
-                yield f'  {unknown:14} {value:12.{digits}f}  +- {told[unknown]:.{digits}f}'
+            yield from unknown_lines(
+                fit.state.lenses[camera], {unknown: told[unknown] for unknown in INTRINSICS}
+            )
             yield (
                 f'  found out to {self._reach_deg(camera):.0f} degrees, the picture shows '
                 f'{np.degrees(lens.edge_rad):.0f}; angles +- {lens.worst_deg:.3f} degrees at '
