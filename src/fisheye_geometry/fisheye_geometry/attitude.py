@@ -92,3 +92,19 @@ def attitude_of(x: float, y: float, z: float, w: float) -> Attitude:
 def angle_between(first: np.ndarray, second: np.ndarray) -> float:
     """Return the angle of the rotation that takes one attitude (3, 3) to another, rad."""
     return float(np.linalg.norm(rotation_vector(np.asarray(first).T @ np.asarray(second))))
+
+
+def closest_rotation(first: np.ndarray, second: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Return the rotation (3, 3) of the second rays that brings them nearest to the first ones.
+
+    Kabsch, Acta Cryst. A32, 1976, doi 10.1107/S0567739476001873.
+
+    Parameters
+    ----------
+    first, second
+        (N, 3) unit vectors, pair by pair.
+    weight
+        (N,) of the pairs.
+    """
+    u, _, vt = np.linalg.svd((first * weight[:, None]).T @ second)
+    return u @ np.diag([1, 1, np.linalg.det(u @ vt)]) @ vt

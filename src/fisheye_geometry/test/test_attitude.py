@@ -8,6 +8,7 @@ from fisheye_geometry.attitude import (
     Attitude,
     angle_between,
     attitude_of,
+    closest_rotation,
     quaternion,
     rotation_matrix,
     rotation_vector,
@@ -45,6 +46,15 @@ def test_rotation_vectors():
     assert rotation_vector(matrix) == pytest.approx([0, 0.4, 0], abs=EXACT)
     assert rotation_matrix([0, 0.4, 0]) == pytest.approx(matrix, abs=EXACT)
     assert angle_between(LEVEL.matrix, matrix) == pytest.approx(0.4)
+
+
+def test_the_closest_rotation_is_the_one_between_all_rays_that_count():
+    second = np.vstack([np.eye(3), [0.6, 0.0, 0.8], [0.0, 0.0, 1.0]])
+    matrix = Attitude(0.4, -0.2, 0.1).matrix
+    first = second @ matrix.T
+    first[-1] = (0.0, 1.0, 0.0)
+    weight = np.array([1.0, 2.0, 1.0, 1.0, 0.0])
+    assert closest_rotation(first, second, weight) == pytest.approx(matrix, abs=EXACT)
 
 
 def test_only_a_turn_about_the_vertical_is_a_pure_yaw():

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from fisheye_geometry.attitude import closest_rotation
 from fisheye_geometry.lens import FisheyeLens, Lens
 from fisheye_undistort.fit.sheet_model import INTRINSICS, intrinsics_of, project
 
@@ -122,18 +123,13 @@ def difference_rad(
         (...) rad; NaN where either sees nothing.
     rotation : ndarray
         (3, 3) rays of the second lens to rays of the first.
-
-    References
-    ----------
-    Kabsch, Acta Cryst. A32, 1976, doi 10.1107/S0567739476001873; weighed anew each round.
     """
     (first, seen_first), (second, seen_second) = (lens.unproject(pixels) for lens in (one, other))
     seen = seen_first & seen_second
     rotation, weight = np.eye(3), np.ones(seen.shape)
     apart = np.linalg.norm(first - second, axis=-1)
     for _ in range(_ROUNDS if turned and seen.any() else 0):
-        u, _, v = np.linalg.svd((weight[..., None] * first)[seen].T @ second[seen])
-        rotation = u @ np.diag([1, 1, np.linalg.det(u @ v)]) @ v
+        rotation = closest_rotation(first[seen], second[seen], weight[seen])
         apart = np.linalg.norm(first - second @ rotation.T, axis=-1)
         # Where the lenses differ most says least about how the cameras are turned.
         weight = 1 / (apart + np.median(apart[seen]) + 1e-12)

@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from fisheye_core.errors import SettingError
+from fisheye_geometry.attitude import angle_between
 from fisheye_geometry.lens import Lens
 from fisheye_undistort.fit.angle_map import difference_rad, picture_grid
 
@@ -53,8 +54,7 @@ class LensDifference:
     @property
     def turned_deg(self) -> float:
         """Angle of the rotation that was taken out."""
-        cosine = (np.trace(self._difference[1]) - 1) / 2
-        return float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
+        return float(np.degrees(angle_between(np.eye(3), self._difference[1])))
 
     @property
     def angle_deg(self) -> np.ndarray:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fisheye_geometry.attitude import closest_rotation
 from panorama_stitch.overlap.correspondences import Correspondences
 
 _COARSE_RAD, _FINE_RAD = np.radians(4.0), np.radians(1.2)
@@ -130,6 +131,5 @@ def _refined(rotation, left, right, weight):
         share = weight * np.maximum(0, 1 - (miss / within) ** 2)
         if np.count_nonzero(share) < 2:
             return rotation
-        u, _, vt = np.linalg.svd((left * share[:, None]).T @ right)
-        rotation = u @ np.diag([1, 1, np.linalg.det(u @ vt)]) @ vt
+        rotation = closest_rotation(left, right, share)
     return rotation

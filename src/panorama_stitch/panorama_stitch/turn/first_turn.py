@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from fisheye_core.errors import CalibrationError
-from fisheye_geometry.attitude import Attitude, rotation_vector
+from fisheye_geometry.attitude import Attitude, closest_rotation, rotation_vector
 from fisheye_geometry.lens import FisheyeLens
 from fisheye_undistort.fit.sheet_model import intrinsics_of
 from panorama_stitch.turn.expectation import NEARNESS
@@ -154,14 +154,12 @@ def _scaled(lens: FisheyeLens, share: float) -> FisheyeLens:
 def _rotation(lens: FisheyeLens, before: np.ndarray, after: np.ndarray) -> np.ndarray:
     """Return the rotation vector of the camera, in its own frame, that most corners agree on.
 
-    Kabsch, Acta Cryst. A32, 1976, doi 10.1107/S0567739476001873, with weights that fall with the
-    distance from it.
+    Their weights fall with the distance from it.
     """
     first, second = lens.unproject(before)[0], lens.unproject(after)[0]
     weight, rotation = np.ones(len(first)), np.eye(3)
     for _ in range(_ROUNDS):
-        u, _, vt = np.linalg.svd((first * weight[:, None]).T @ second)
-        rotation = u @ np.diag([1, 1, np.linalg.det(u @ vt)]) @ vt
+        rotation = closest_rotation(first, second, weight)
         miss = np.linalg.norm(first - second @ rotation.T, axis=1)
         weight = 1 / (1 + (miss / max(float(np.median(miss)), 1e-6)) ** 2) ** 2
     return rotation_vector(rotation)
