@@ -44,3 +44,8 @@ def exit_code(name: str, command: Callable[[], int]) -> int:
         # Python would write the rest when it ends, and say that it cannot.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return _NO_READER
+
+
+def show_progress(line: str, width: int) -> None:
+    """Show how far a command has come, on the same line as before, cut or filled to a width."""
+    print(f'\r{line:{width}.{width}}', end='', file=sys.stderr, flush=True)

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from fisheye_core.command_line import exit_code
+from fisheye_core.command_line import exit_code, show_progress
 from fisheye_core.errors import SettingError
 from fisheye_geometry.camera_file import Camera, read_camera
 from fisheye_undistort.calibrate_options import make_parser, target_of
@@ -92,7 +92,7 @@ def _gathered(options: argparse.Namespace) -> Gathered:
 
     def progress(line: str) -> None:
         if shown:
-            print(f'\r{line:60.60}', end='', file=sys.stderr, flush=True)
+            show_progress(line, 60)
 
     try:
         return gather(lambda: read_pictures(options.pictures, options.half), detector, progress)

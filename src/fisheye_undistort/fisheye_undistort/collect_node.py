@@ -1,12 +1,11 @@
 """Collects calibration views from a live image topic."""
 
-import sys
-
-from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 
-from fisheye_bridge.running import spin_until, started
+from fisheye_bridge.running import spin_until
 from fisheye_bridge.topics import ImageSubscription
+from fisheye_bridge.watching import watch
+from fisheye_core.command_line import show_progress
 from fisheye_core.encodings import converted
 from fisheye_core.errors import SettingError, SourceError
 from fisheye_undistort.detect.collector import Collector
@@ -38,8 +37,7 @@ class CollectNode(Node):
         self.count += 1
         gray = cut(converted(image, encoding, 'mono8'), self._half)
         self._collector.add(NamedPicture(f'picture {self.count}', gray, moving=True))
-        line = f'{self._collector.progress()}: {self._collector.state or "taken"}'
-        print(f'\r{line:{_LINE}.{_LINE}}', end='', file=sys.stderr, flush=True)
+        show_progress(f'{self._collector.progress()}: {self._collector.state or "taken"}', _LINE)
 
 
 def collect(topic: str, collector: Collector, views: int, half: str = '') -> None:
@@ -54,17 +52,12 @@ def collect(topic: str, collector: Collector, views: int, half: str = '') -> Non
     """
     if views < 1:
         raise SettingError(f'{views} views are to be collected; expected at least 1')
-    try:
-        with started(CollectNode, topic, collector, half) as node:
-            while len(collector.views) < views:
-                _wait_for_picture(node, topic)
-    except InvalidTopicNameException as error:
-        reason = str(error).splitlines()[0]
-        raise SettingError(f"the topic '{topic}' is not possible: {reason}") from error
-    except KeyboardInterrupt:
-        pass  # What was collected so far is calibrated.
-    finally:
-        print(file=sys.stderr)
+
+    def see(node: CollectNode) -> None:
+        while len(collector.views) < views:
+            _wait_for_picture(node, topic)
+
+    watch(see, CollectNode, topic, collector, half)
 
 
 def _wait_for_picture(node: CollectNode, topic: str) -> None:

@@ -1,17 +1,17 @@
 """Watches the topics of a rig's cameras while it turns."""
 
-import sys
 from collections.abc import Mapping
 
 import numpy as np
-from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 
-from fisheye_bridge.running import spin_until, started
+from fisheye_bridge.running import spin_until
 from fisheye_bridge.stamps import ns_of
 from fisheye_bridge.topics import ImageSubscription
+from fisheye_bridge.watching import watch
+from fisheye_core.command_line import show_progress
 from fisheye_core.encodings import converted
-from fisheye_core.errors import FisheyeError, SettingError, SourceError
+from fisheye_core.errors import FisheyeError, SourceError
 from panorama_stitch.pipeline.pairing import FramePairing
 from panorama_stitch.turn.full_circle import has_come_round
 from panorama_stitch.turn.tracker import TurnTracker
@@ -59,8 +59,8 @@ class RecordNode(Node):
             self._tracker.add(pictures)
         except FisheyeError as error:
             self.error = error
-        line = f'{self.count} pictures, {len(self._tracker.frames)} kept: go on turning'
-        print(f'\r{line:{_LINE}.{_LINE}}', end='', file=sys.stderr, flush=True)
+        kept = len(self._tracker.frames)
+        show_progress(f'{self.count} pictures, {kept} kept: go on turning', _LINE)
 
 
 def record(topics: Mapping[str, str], tracker: TurnTracker) -> None:
@@ -82,16 +82,12 @@ def record(topics: Mapping[str, str], tracker: TurnTracker) -> None:
     FisheyeError
         What the tracker raises.
     """
-    try:
-        with started(RecordNode, topics, tracker) as node:
-            while not has_come_round(tracker.frames):
-                _wait_for_pictures(node, topics)
-    except InvalidTopicNameException as error:
-        raise SettingError(f'a topic is not possible: {str(error).splitlines()[0]}') from error
-    except KeyboardInterrupt:
-        pass  # What was seen so far is calibrated.
-    finally:
-        print(file=sys.stderr)
+
+    def see(node: RecordNode) -> None:
+        while not has_come_round(tracker.frames):
+            _wait_for_pictures(node, topics)
+
+    watch(see, RecordNode, topics, tracker)
 
 
 def _wait_for_pictures(node: RecordNode, topics: Mapping[str, str]) -> None:

@@ -1,0 +1,34 @@
+"""Topics that a command watches: an end by Ctrl-C, and names that are not possible."""
+
+import pytest
+import rclpy
+from rclpy.node import Node
+from sensor_msgs.msg import Image
+
+from fisheye_bridge.qos import IMAGE
+from fisheye_bridge.watching import watch
+from fisheye_core.errors import SettingError
+
+
+class Watcher(Node):
+    def __init__(self, topic):
+        super().__init__('watcher')
+        self.create_subscription(Image, topic, lambda message: None, IMAGE)
+
+
+def test_ctrl_c_ends_it_and_leaves_what_was_seen():
+    seen = []
+
+    def see(node):
+        seen.append(node.get_name())
+        raise KeyboardInterrupt
+
+    watch(see, Watcher, '/watching_test/image')
+    assert seen == ['watcher']
+    assert not rclpy.ok()
+
+
+def test_a_name_that_no_topic_has_is_told():
+    with pytest.raises(SettingError, match=r"^the topic '/no topic' is not possible: .*[^:]$"):
+        watch(lambda node: None, Watcher, '/no topic')
+    assert not rclpy.ok()
