@@ -11,6 +11,10 @@ from fisheye_testing.data import real_data
 from fisheye_undistort.fit.estimate import TargetView
 from fisheye_undistort.target.target import STANDARD
 
+FOCAL = 0.003
+"""What is asked of twelve photographs of a sheet: share of the focal length, px."""
+CENTER_PX = 0.5
+
 
 def fisheye(fov_deg: int, scale: int = 1) -> FisheyeLens:
     """Return a lens that sees 170 or 190 degrees across 640 * scale pixels."""
@@ -34,6 +38,14 @@ def seen_exactly(lens, target, pose, name='view') -> TargetView:
     """Return the projections of a target's points."""
     points = target.points_mm @ pose.rotation.T + pose.translation_mm
     return TargetView(name, lens.project(points)[0], np.arange(len(points)))
+
+
+def demand(lens, truth):
+    """Demand the intrinsics of the truth."""
+    assert abs(lens.focal_x_px / truth.focal_x_px - 1) < FOCAL
+    assert abs(lens.focal_y_px / truth.focal_y_px - 1) < FOCAL
+    assert abs(lens.center_x_px - truth.center_x_px) < CENTER_PX
+    assert abs(lens.center_y_px - truth.center_y_px) < CENTER_PX
 
 
 @pytest.fixture
