@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rendered_view import render_view, scattered_poses
+from undistort_bench import Bench
 
 from fisheye_geometry.lens import FisheyeLens
 from fisheye_testing.data import real_data
@@ -73,3 +74,17 @@ def paper_pictures(paper_lens, paper_poses):
         render_view(paper_lens, STANDARD['circles'], pose, seed=seed)
         for seed, pose in enumerate(paper_poses)
     ]
+
+
+@pytest.fixture
+def make_bench(request):
+    benches = []
+
+    def make(**parameters):
+        name = ''.join(c if c.isalnum() else '_' for c in request.node.name)
+        benches.append(Bench(name, **parameters))
+        return benches[-1]
+
+    yield make
+    for bench in benches:
+        bench.close()
