@@ -7,7 +7,6 @@ from io import BytesIO
 
 import cv2
 import numpy as np
-from PIL import Image
 
 from fisheye_core.errors import ImageFormatError
 from fisheye_core.quiet_jpeg import without_libjpeg_lines
@@ -19,7 +18,6 @@ _END = b'\xff\xd9'
 _SCAN = b'\xff\xda'
 _MAX_PIXELS = 50_000_000
 """A few bytes can claim to be more than fits into memory."""
-Image.MAX_IMAGE_PIXELS = None  # Pillow's own limit is a larger one, and its sentence has no size.
 _OTHER_KINDS = 'BMP', 'JPEG2000', 'PPM', 'TIFF', 'WEBP'
 _NO_FRAMES = 0xC4, 0xC8, 0xCC
 """Markers of tables among those that begin a frame."""
@@ -143,6 +141,9 @@ def _check_claim(coded: np.ndarray) -> None:
 
 def _size_of_other(coded: np.ndarray) -> tuple[int, int]:
     """Return the width and height, px, that a picture of another kind than JPEG or PNG claims."""
+    from PIL import Image  # Not before: what cameras send needs none of it.
+
+    Image.MAX_IMAGE_PIXELS = None  # Its own limit is a larger one, and its sentence has no size.
     try:
         with warnings.catch_warnings():
             warnings.simplefilter('ignore')  # Of what is odd in tags that nobody needs.
