@@ -11,8 +11,8 @@ from viewer_page import CLOSE_DEG, MAGENTA, SURFACES, Page, painted, patch
 
 from fisheye_geometry.surface import Surface
 from panorama_viewer.address import is_loopback, reachable
-from panorama_viewer.certificate import tls_of
 from panorama_viewer.settings import ViewerSettings
+from panorama_viewer.tls import tls_of
 
 serve = viewer_page.serve  # its fixture
 

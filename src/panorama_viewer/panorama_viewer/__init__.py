@@ -2,7 +2,7 @@
 
 Begin with `viewer_node`, which takes what the rig publishes, and `server`, the thread that hands
 it to browsers. `gate` and `connection` bound who is connected, `guard` and `token` who may do
-what, `certificate` encrypts, `site` answers, `audience` has the places, `browser` serves one of
+what, `tls` encrypts, `site` answers, `audience` has the places, `browser` serves one of
 them what `feeds` makes of each picture, as often as `pace` finds that its link takes one; the page
 is in `web/`. The command `snapshot` is `snapshot_node`; its files are made by `snapshot`.
 """

@@ -1,14 +1,12 @@
-"""The certificate for https: the user's, or one of the viewer's own that is kept between runs."""
+"""The viewer's own certificate for https, kept between runs."""
 
 import os
 import socket
-import ssl
 import tempfile
 from collections.abc import Iterable
 from datetime import datetime, timedelta, timezone
 from ipaddress import ip_address, ip_network
 from pathlib import Path
-from typing import NamedTuple
 
 from cryptography import x509
 from cryptography.hazmat.primitives.asymmetric import ec
@@ -16,72 +14,12 @@ from cryptography.hazmat.primitives.hashes import SHA256
 from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
-from fisheye_core.errors import FileAccessError, SettingError
-from panorama_viewer.settings import ViewerSettings
+from fisheye_core.errors import FileAccessError
 
 _VALID = timedelta(days=820)
 """iPhones believe none that is valid for more than 825 days."""
 _RENEWED = timedelta(days=60)
 """Before its end: a viewer runs for days, and phones have to be told of a new one."""
-
-
-class Tls(NamedTuple):
-    """How to encrypt, the viewer's own certificate (PEM; empty for the user's), and its file."""
-
-    context: ssl.SSLContext
-    own: bytes
-    path: Path
-
-
-def tls_of(settings: ViewerSettings, addresses: Iterable[str]) -> Tls | None:
-    """Return how to serve as the settings say; None for http.
-
-    Parameters
-    ----------
-    settings
-        `https`, `certificate` and `key`.
-    addresses
-        Under which others reach this machine: an own certificate names them.
-
-    Raises
-    ------
-    SettingError
-        If certificate and key cannot be used together.
-    FileAccessError
-        If the own certificate cannot be read or written.
-    """
-    if not settings.https:
-        return None
-    if settings.key and not settings.certificate:
-        raise SettingError(f"key is '{settings.key}', but certificate is empty; expected both")
-    if settings.certificate:
-        path, key = Path(settings.certificate), Path(settings.key or settings.certificate)
-        return Tls(_context(path, key), b'', path)
-    path = Path(os.environ.get('ROS_HOME') or '~/.ros').expanduser() / 'panorama_viewer.pem'
-    now = datetime.now(timezone.utc)
-    own = kept_certificate(path, {*_own_names(), settings.host, *addresses}, now)
-    return Tls(_context(path, path), own, path)
-
-
-def _own_names() -> list[str]:
-    name = socket.gethostname().lower()
-    return ['localhost', name, f'{name}.local', '127.0.0.1', '::1']
-
-
-def _context(certificate: Path, key: Path) -> ssl.SSLContext:
-    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-    for name, path in (('certificate', certificate), ('key', key)):
-        if not path.is_file():  # a FIFO would be waited for
-            raise SettingError(f"{name} is '{path}', which is no file; expected one in PEM")
-    try:
-        # Without a password OpenSSL would ask for one on the terminal.
-        context.load_cert_chain(certificate, key, password='')
-    except OSError as error:
-        raise SettingError(
-            f"certificate '{certificate}' and key '{key}' cannot be used: {error}; expected a "
-            'certificate and its key in PEM, without a password'
-        ) from error
-    return context
 
 
 def kept_certificate(path: Path, names: Iterable[str], now: datetime) -> bytes:
@@ -117,11 +55,6 @@ def kept_certificate(path: Path, names: Iterable[str], now: datetime) -> bytes:
     except OSError as error:
         raise FileAccessError(path, 'used as certificate', error.strerror) from error
     return certificate
-
-
-def fingerprint(certificate: bytes) -> str:
-    """Return what a browser shows of a certificate (PEM): SHA-256, in pairs of digits."""
-    return x509.load_pem_x509_certificate(certificate).fingerprint(SHA256()).hex(':').upper()
 
 
 def _general_name(name: str) -> x509.GeneralName:

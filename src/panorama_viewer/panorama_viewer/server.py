@@ -14,12 +14,12 @@ from aiohttp import web
 
 from fisheye_core.errors import SettingError
 from panorama_viewer.address import reachable, refusal
-from panorama_viewer.certificate import Tls
 from panorama_viewer.faults import Faults
 from panorama_viewer.gate import Gate
 from panorama_viewer.projection import Quaternion
 from panorama_viewer.settings import ViewerSettings
 from panorama_viewer.site import Site
+from panorama_viewer.tls import Tls
 
 _SHUTDOWN_S = 1.0
 """What a request that is not answered may hold up the end."""

@@ -20,11 +20,11 @@ from fisheye_bridge.qos import IMAGE_INPUT, LATCHED, LATCHED_INPUT
 from fisheye_bridge.running import run
 from fisheye_bridge.stamps import ns_of
 from fisheye_core.errors import FisheyeError, OverlapError
-from panorama_viewer.certificate import fingerprint, tls_of
 from panorama_viewer.projection import Quaternion, StateHistory, described, turned
 from panorama_viewer.server import ViewerServer
 from panorama_viewer.settings import ViewerSettings
 from panorama_viewer.status import ViewerStatus, measured
+from panorama_viewer.tls import fingerprint, tls_of
 from panorama_viewer.token import print_on_terminal
 
 _TELL_S = 0.5

@@ -15,8 +15,9 @@ from cryptography.hazmat.primitives import serialization
 from serving import DEADLINE_S, address, picture, state, visit
 
 from fisheye_core.errors import FileAccessError, SettingError
-from panorama_viewer.certificate import fingerprint, kept_certificate, tls_of
+from panorama_viewer.certificate import kept_certificate
 from panorama_viewer.settings import ViewerSettings
+from panorama_viewer.tls import fingerprint, tls_of
 
 NAMES = 'robot', 'robot.local', '127.0.0.1', 'fd00::7'
 NOW = datetime(2026, 6, 1, tzinfo=timezone.utc)
