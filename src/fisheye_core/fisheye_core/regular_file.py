@@ -71,11 +71,11 @@ def read_regular(path: str | Path, max_bytes: int) -> bytes:
         return file.read(max_bytes + 1)
 
 
-def replace_regular(path: str | Path, text: str) -> None:
+def replace_regular(path: str | Path, text: str, *, mode: int = 0o644) -> None:
     """Write a file so that readers see the former content or the new one, never a part.
 
     A link stays, and what it leads to is replaced. What writers that were killed left behind is
-    removed.
+    removed. Nobody but the owner can read it before it has its mode.
 
     Raises
     ------
@@ -93,7 +93,7 @@ def replace_regular(path: str | Path, text: str) -> None:
             file.write(text)
             file.flush()
             os.fsync(file.fileno())
-            os.fchmod(file.fileno(), 0o644)
+            os.fchmod(file.fileno(), mode)
             Path(temporary).replace(path)
     except OSError:
         Path(temporary).unlink(missing_ok=True)

@@ -1,8 +1,6 @@
 """The viewer's own certificate for https, kept between runs."""
 
-import os
 import socket
-import tempfile
 from collections.abc import Iterable
 from datetime import datetime, timedelta, timezone
 from ipaddress import ip_address, ip_network
@@ -15,6 +13,7 @@ from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption,
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from fisheye_core.errors import FileAccessError
+from fisheye_core.regular_file import replace_regular
 
 _VALID = timedelta(days=820)
 """iPhones believe none that is valid for more than 825 days."""
@@ -48,10 +47,7 @@ def kept_certificate(path: Path, names: Iterable[str], now: datetime) -> bytes:
         if path.exists() and (kept := _usable(path.read_bytes(), wanted, now)):
             return kept
         certificate, key = _made(wanted, now)
-        descriptor, temporary = tempfile.mkstemp('.tmp', path.name, path.parent)
-        with os.fdopen(descriptor, 'wb') as file:
-            file.write(key + certificate)
-        Path(temporary).replace(path)
+        replace_regular(path, (key + certificate).decode(), mode=0o600)
     except OSError as error:
         raise FileAccessError(path, 'used as certificate', error.strerror) from error
     return certificate
