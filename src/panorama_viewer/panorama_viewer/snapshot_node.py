@@ -1,7 +1,6 @@
 """Saves one panorama: the command `snapshot`."""
 
 import argparse
-import sys
 from math import inf
 from pathlib import Path
 
@@ -15,8 +14,9 @@ from fisheye_bridge.qos import LATCHED_INPUT
 from fisheye_bridge.running import spin_until, started
 from fisheye_bridge.stamps import ns_of
 from fisheye_bridge.topics import ImageSubscription
+from fisheye_core.command_line import exit_code
 from fisheye_core.encodings import to_opencv
-from fisheye_core.errors import FisheyeError, SettingError, SourceError
+from fisheye_core.errors import SettingError, SourceError
 from fisheye_geometry.surface import Surface
 from panorama_viewer.projection import Quaternion, StateHistory, turned
 from panorama_viewer.snapshot import FORMATS, save
@@ -94,14 +94,12 @@ def parse() -> argparse.Namespace:
 def main() -> int:
     """Save a panorama and say where."""
     arguments = parse()
-    try:
-        with started(SnapshotNode) as node:
-            taken = node.wait(arguments.timeout)
-        for path in save(arguments.out, arguments.format, *taken):
-            print(f'Saved {path}')
-    except FisheyeError as error:
-        print(f'snapshot: {error}', file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        return 130
+    return exit_code('snapshot', lambda: _run(arguments))
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    with started(SnapshotNode) as node:
+        taken = node.wait(arguments.timeout)
+    for path in save(arguments.out, arguments.format, *taken):
+        print(f'Saved {path}')
     return 0
