@@ -51,8 +51,8 @@ def test_pictures_come_as_h264_that_begins_with_a_keyframe(serve):
     visit(scenario)
 
 
-def test_a_page_that_cannot_go_on_gets_a_keyframe(serve):
-    server = serve()
+def kinds_around(server, change):
+    """Return how the messages of four pictures begin; `change` comes after the second."""
 
     async def scenario(session):
         async with look(session, server) as stream:
@@ -62,30 +62,32 @@ def test_a_page_that_cannot_go_on_gets_a_keyframe(serve):
                 kinds.append((await shown(server, stream, number))[0])
                 await stream.send_str('drawn')
                 if number == 1:
-                    await stream.send_str('h264')
-                    server.tell(mark=1)
-                    await stream.send_str('heard')
-                    await state(stream, lambda told: told.get('mark'))
-            assert kinds == [KEYFRAME, DELTA, KEYFRAME, DELTA]
+                    await change(stream)
+            return kinds
 
-    visit(scenario)
+    return visit(scenario)
+
+
+def test_a_page_that_cannot_go_on_gets_a_keyframe(serve):
+    server = serve()
+
+    async def ask(stream):
+        await stream.send_str('h264')
+        server.tell(mark=1)
+        await stream.send_str('heard')
+        await state(stream, lambda told: told.get('mark'))
+
+    assert kinds_around(server, ask) == [KEYFRAME, DELTA, KEYFRAME, DELTA]
 
 
 def test_a_bit_rate_that_is_set_applies_at_once(serve):
     server = serve(video_bitrate_kbps=2000)
 
-    async def scenario(session):
-        async with look(session, server) as stream:
-            await state(stream, lambda _: True)
-            kinds = []
-            for number in range(4):
-                kinds.append((await shown(server, stream, number))[0])
-                await stream.send_str('drawn')
-                if number == 1:
-                    server.apply(ViewerSettings(video_bitrate_kbps=1500))
-            assert kinds == [KEYFRAME, DELTA, KEYFRAME, DELTA], 'the encoder was opened anew'
+    async def lower(_):
+        server.apply(ViewerSettings(video_bitrate_kbps=1500))
 
-    visit(scenario)
+    expected = [KEYFRAME, DELTA, KEYFRAME, DELTA]
+    assert kinds_around(server, lower) == expected, 'the encoder was opened anew'
 
 
 def test_a_page_can_give_h264_up(serve):
