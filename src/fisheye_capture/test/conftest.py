@@ -5,7 +5,16 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import CameraInfo, Image
+from sensor_msgs.srv import SetCameraInfo
 
+from fisheye_bridge.qos import IMAGE
+from fisheye_capture.capture_node import CaptureNode
 from fisheye_capture.capture_settings import CaptureSettings
 from fisheye_testing.waiting import wait_for
 
@@ -48,3 +57,72 @@ def video(tmp_path):
         writer.write(np.full((24, 32, 3), level, np.uint8))
     writer.release()
     return path
+
+
+class Ear(Node):
+    """Keeps the last message of each topic of the camera called left."""
+
+    def __init__(self, context):
+        super().__init__('ear', context=context)
+        self.heard, self.topics = {}, {}
+        for kind, topic in (
+            (Image, '/left/image_raw'),
+            (CameraInfo, '/left/camera_info'),
+            (DiagnosticArray, '/diagnostics'),
+        ):
+            self.listen(kind, topic)
+
+    def listen(self, kind, topic):
+        self.topics[topic] = self.create_subscription(
+            kind, topic, lambda message: self.heard.update({topic: message}), IMAGE
+        )
+
+
+@pytest.fixture
+def ros(wait_until):
+    """Return `start`, which builds the node, and `hear`, which spins until a topic was heard."""
+
+    class Ros:
+        def __init__(self):
+            self.context = rclpy.Context()
+            rclpy.init(context=self.context)
+            self.executor = SingleThreadedExecutor(context=self.context)
+            self.ear = Ear(self.context)
+            self.executor.add_node(self.ear)
+            self.nodes = [self.ear]
+
+        def start(self, namespace='/left', **parameters):
+            node = CaptureNode(
+                context=self.context,
+                namespace=namespace,
+                parameter_overrides=[
+                    Parameter(name, value=value) for name, value in parameters.items()
+                ],
+            )
+            self.nodes.append(node)
+            self.executor.add_node(node)
+            return node
+
+        def spin_until(self, condition, what):
+            def spun():
+                self.executor.spin_once(timeout_sec=0.05)
+                return condition()
+
+            wait_until(spun, what)
+
+        def hear(self, topic):
+            self.ear.heard.pop(topic, None)
+            self.spin_until(lambda: topic in self.ear.heard, topic)
+            return self.ear.heard[topic]
+
+        def call(self, camera_info):
+            client = self.ear.create_client(SetCameraInfo, '/left/set_camera_info')
+            future = client.call_async(SetCameraInfo.Request(camera_info=camera_info))
+            self.spin_until(future.done, 'the answer')
+            return future.result()
+
+    ros = Ros()
+    yield ros
+    for node in reversed(ros.nodes):
+        node.destroy_node()
+    rclpy.shutdown(context=ros.context)
