@@ -1,4 +1,3 @@
-import asyncio
 import re
 import socket
 from contextlib import closing
@@ -8,11 +7,10 @@ from urllib.parse import urlsplit
 
 import aiohttp
 import pytest
-from serving import DEADLINE_S, address, answered, here, picture, request, state, token, visit
+from serving import DEADLINE_S, address, answered, here, request, token, visit
 
 import panorama_viewer
 from fisheye_core.errors import OverlapError, SettingError
-from fisheye_testing.waiting import wait_for
 from panorama_viewer.server import ViewerServer
 from panorama_viewer.settings import ViewerSettings
 
@@ -76,116 +74,12 @@ def test_other_sites_are_refused(serve, headers, status):
             visit(look)
 
 
-def test_a_slow_browser_gets_fewer_pictures_and_no_old_one(serve):
-    server = serve()
-
-    async def scenario(session):
-        async with session.ws_connect(address(server, 'live')) as stream:
-            await state(stream, lambda _: True)
-            server.show(b'first')
-            assert await picture(stream) == b'first'
-            server.show(b'overtaken')
-            server.show(b'newest')
-            server.tell(mark=1)
-            # What was sent before this state would have come before it.
-            await state(stream, lambda told: told.get('mark') == 1)
-            await stream.send_str('drawn')
-            assert await picture(stream) == b'newest'
-
-    visit(scenario)
-
-
-def test_a_fast_browser_does_not_wait_for_a_slow_one(serve):
-    server = serve()
-
-    async def scenario(session):
-        async with (
-            session.ws_connect(address(server, 'live')) as slow,
-            session.ws_connect(address(server, 'live')) as fast,
-        ):
-            await state(slow, lambda _: True)
-            await state(fast, lambda _: True)
-            for number in range(5):
-                server.show(b'%d' % number)
-                assert await picture(fast) == b'%d' % number
-                await fast.send_str('drawn')
-            assert await picture(slow) == b'0'
-
-    visit(scenario)
-
-
-def test_a_stale_picture_is_shown_to_nobody_new(serve):
-    server = serve(stale_after_s=0.1)
-
-    async def scenario(session):
-        async with session.ws_connect(address(server, 'live')) as first:
-            await state(first, lambda _: True)
-            server.show(b'old')
-            assert await picture(first) == b'old'
-            status = 200
-            while status != 503:
-                async with session.post(address(server, 'snapshot')) as reply:
-                    status = reply.status
-                await asyncio.sleep(0.05)
-            async with session.ws_connect(address(server, 'live')) as second:
-                await state(second, lambda _: True)
-                server.show(b'new')
-                assert await picture(second) == b'new'
-
-    visit(scenario)
-
-
-def test_the_first_browser_and_the_last_are_reported(serve):
-    reports = []
-    server = serve(watched=lambda: reports.append(server.watchers))
-
-    async def scenario(session):
-        async with (
-            session.ws_connect(address(server, 'live')) as first,
-            session.ws_connect(address(server, 'live')) as second,
-        ):
-            await state(first, lambda _: True)
-            await state(second, lambda _: True)
-
-    visit(scenario)
-    wait_for(lambda: server.watchers == 0)
-    assert reports == [1, 0]
-
-
-def test_the_number_of_browsers_is_bounded(serve):
-    server = serve(max_clients=1)
-
-    async def scenario(session):
-        async with session.ws_connect(address(server, 'live')) as first:
-            await state(first, lambda _: True)
-            async with session.ws_connect(address(server, 'live')) as second:
-                message = await second.receive()
-                assert message.type is aiohttp.WSMsgType.CLOSE
-                assert 'the limit' in message.extra
-
-    visit(scenario)
-
-
 @pytest.mark.parametrize('header', [b'Host: \xff\xfe', b'Host: localhost\r\nX-Token: \xff\xfe'])
 def test_bytes_that_are_no_text_are_refused(serve, header):
     port = int(serve(host='0.0.0.0').url.split(':')[2].split('/')[0])
     with socket.create_connection(('127.0.0.1', port), timeout=DEADLINE_S) as connection:
         connection.sendall(b'POST /calibrate HTTP/1.1\r\n' + header + b'\r\n\r\n')
         assert connection.recv(100).split()[1] in (b'400', b'403')
-
-
-@pytest.mark.parametrize('words', ['what', 'x' * 100_000])
-def test_who_says_something_else_is_shown_out(serve, words):
-    server = serve()
-
-    async def scenario(session):
-        async with session.ws_connect(address(server, 'live')) as stream:
-            await stream.send_str(words)
-            async for _ in stream:
-                pass
-            assert stream.closed
-
-    visit(scenario)
 
 
 def test_only_who_knows_the_token_may_press_buttons_from_elsewhere(serve):
@@ -251,26 +145,3 @@ def test_a_name_that_cannot_be_one_is_a_sentence():
     server = unserved(host='....', port=0)
     with pytest.raises(SettingError, match=r'cannot serve on port 0 of \.\.\.\.: '):
         server.start()
-
-
-def test_what_levels_a_picture_comes_before_it_and_once(serve):
-    server = serve()
-    nod = (0.1, 0.0, 0.0, 0.995)
-
-    async def look(session):
-        came = []
-        async with session.ws_connect(address(server, 'live')) as stream:
-            shown = [(b'plain', None), (b'turned', nod), (b'again', nod), (b'level', None)]
-            for jpeg, orientation in shown:
-                server.show(jpeg, orientation)
-                async for message in stream:
-                    if message.type is aiohttp.WSMsgType.BINARY:
-                        came.append(message.data)
-                        break
-                    if 'orientation' in message.json():
-                        came.append(message.json()['orientation'])
-                await stream.send_str('drawn')
-        return came
-
-    came = visit(look)
-    assert came == [b'plain', list(nod), b'turned', b'again', None, b'level']
