@@ -155,7 +155,8 @@ class FrameSets:
         """Show what lives beside the last images of the rest; the first living sets the pace."""
         ages_s, cameras = self.ages_s(), self._cameras
         living = [name for name in cameras.cameras if name not in ages_s]
-        if not ages_s or camera != living[0] or not cameras.is_complete:
+        # None lives where this thread itself was kept waiting for so long.
+        if not ages_s or living[:1] != [camera] or not cameras.is_complete:
             return None
         last = {name: self._stale.last(name) for name in cameras.cameras}
         live = last[camera]
