@@ -11,8 +11,9 @@ from fisheye_bridge.projection import surface_of
 from fisheye_core.errors import FileAccessError
 from fisheye_geometry.attitude import Attitude, quaternion
 from fisheye_geometry.surface import Surface
+from panorama_viewer.photo_sphere import gpano, on_sphere
 from panorama_viewer.projection import StateHistory, turned
-from panorama_viewer.snapshot import gpano, on_sphere, save
+from panorama_viewer.snapshot import save
 
 SURFACES = [
     Surface('cylindrical', 1200, 480, 215.0, 590.0, 250.0),
