@@ -252,12 +252,18 @@ def test_the_whole_rig_in_a_browser(browser, rig, watcher):
     page.until(lambda: re.match(r'[01]\.\d\d', page.text('overlap')), 'an overlap')
     page.until(lambda: page.text('condition').startswith('Live'), 'a live picture')
     page.until(lambda: moves(page.shot('whole'), page.shot('whole')), 'a movement')
-    surface = surface_of(page.until(lambda: watcher.projection, 'the projection'))
     width = page.find('whole').size['width']
-    x = 0.75 * surface.width - 0.5
-    ray = surface.rays(np.array([x]), np.array([surface.center_y_px]))[0]
-    true_deg = math.degrees(math.atan2(ray[0], ray[2]))
-    assert page.point('whole', 0.75 * width, 100) == pytest.approx(true_deg, abs=CLOSE_DEG)
+
+    def shows_the_bearing():
+        # Page and watcher may stand on either side of a measured overlap for a moment.
+        surface = surface_of(watcher.projection)
+        x = 0.75 * surface.width - 0.5
+        ray = surface.rays(np.array([x]), np.array([surface.center_y_px]))[0]
+        true_deg = math.degrees(math.atan2(ray[0], ray[2]))
+        return abs(page.point('whole', 0.75 * width, 100) - true_deg) < CLOSE_DEG
+
+    page.until(lambda: watcher.projection, 'the projection')
+    page.until(shows_the_bearing, 'the bearing of the projection')
     page.press('c')
     page.until(lambda: 'confidence' in page.text('answer'), 'a calibration')
     page.press('s')
