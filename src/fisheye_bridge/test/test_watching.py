@@ -10,7 +10,7 @@ from fisheye_bridge.watching import watch
 from fisheye_core.errors import SettingError
 
 
-class Watcher(Node):
+class TopicWatcher(Node):
     def __init__(self, topic):
         super().__init__('watcher')
         self.create_subscription(Image, topic, lambda message: None, IMAGE)
@@ -23,12 +23,12 @@ def test_ctrl_c_ends_it_and_leaves_what_was_seen():
         seen.append(node.get_name())
         raise KeyboardInterrupt
 
-    watch(see, Watcher, '/watching_test/image')
+    watch(see, TopicWatcher, '/watching_test/image')
     assert seen == ['watcher']
     assert not rclpy.ok()
 
 
 def test_a_name_that_no_topic_has_is_told():
     with pytest.raises(SettingError, match=r"^the topic '/no topic' is not possible: .*[^:]$"):
-        watch(lambda node: None, Watcher, '/no topic')
+        watch(lambda node: None, TopicWatcher, '/no topic')
     assert not rclpy.ok()
