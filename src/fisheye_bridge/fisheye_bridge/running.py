@@ -23,6 +23,7 @@ from fisheye_bridge.command_line import refuse_words, usage
 from fisheye_bridge.hearing import hearing_of
 from fisheye_bridge.network import Links, forget_machine, refresher
 from fisheye_bridge.parameters import misspelt
+from fisheye_bridge.watchdog import Watchdog
 from fisheye_core.errors import FisheyeError
 
 _Node = TypeVar('_Node', bound=Node)
@@ -71,6 +72,7 @@ class _Process:
         self._former: Node | None = None
         self._parameters: list[Parameter] = []
         self._tries = 0
+        self._watchdog = Watchdog()
         self._parent = os.getppid() if os.environ.get(_BOUND) == '1' else None
         self._ended = threading.Event()
         for number in (signal.SIGINT, signal.SIGTERM):
@@ -90,6 +92,7 @@ class _Process:
             return 1
         finally:
             rclpy.try_shutdown()
+            self._watchdog.stop()
         return 0
 
     def _live(self) -> None:
@@ -97,6 +100,7 @@ class _Process:
         executor = None
         bad_ports: list[str] = []
         links = Links()
+        self._watchdog.feed()
         _init(self._node_class)
         try:
             self._node = node = self._built()
@@ -105,6 +109,7 @@ class _Process:
             refresh, hearing = refresher(node), hearing_of(node)
             while not self._ended.is_set():
                 executor.spin_once(timeout_sec=_LONGEST_WAIT_S)
+                self._watchdog.feed()
                 if self._parent not in (None, os.getppid()):
                     node.get_logger().info('ending, as the process that started this node did')
                     self._end()
