@@ -1,14 +1,14 @@
 """Who may be connected: bounds that hold before a request has been read.
 
-A connection begins as a stranger: it must have been answered within a few seconds, and it goes
-when room is needed, first of all one from the address that holds the most. Who has shown the
-token, or has a place to look from, is known: that connection stays.
+A socket that has said nothing is only held. One that has begins as a stranger: it must have been
+answered within a few seconds, and it goes when room is needed, first of all one from the address
+that holds the most. Who has shown the token, or has a place to look from, is known: that
+connection stays.
 """
 
 import asyncio
 import socket
 import ssl
-from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
 from errno import EADDRNOTAVAIL, EAFNOSUPPORT
@@ -20,6 +20,7 @@ from panorama_viewer.address import source_of
 from panorama_viewer.allowance import Allowances
 from panorama_viewer.connection import ANSWERED_WITHIN_S, Connection
 from panorama_viewer.faults import Faults
+from panorama_viewer.quiet_sockets import QuietSockets, oldest_of_most
 
 MAX_STRANGERS, MAX_ENTERING = 128, 128
 """The latter are in the handshake of https, before they count as strangers."""
@@ -30,9 +31,6 @@ _PAUSE_S = 0.2
 """When the process has no more descriptors, and no stranger holds one."""
 _CONNECTS, _CONNECTS_PER_S = 300, 200.0
 """Of one address; the page takes about fifteen."""
-_MAX_REFUSED, _REFUSED_S = 256, 1.0
-"""How many beyond that are held, and how long: who is told at once is back at once, again and
-again, and others of the same address hardly get a turn."""
 
 
 class Gate:
@@ -44,9 +42,9 @@ class Gate:
         self._listeners: list[socket.socket] = []
         self._entering: dict[asyncio.Task, None] = {}
         self._connections: dict[asyncio.BaseTransport, Connection] = {}
-        self._strangers: dict[Connection, None] = {}
+        self._strangers: dict[Connection, str] = {}
         self._allowances = Allowances(_CONNECTS, _CONNECTS_PER_S)
-        self._refused: dict[socket.socket, None] = {}
+        self._quiet = QuietSockets(self._admit)
 
     async def open(self, host: str, port: int, serve: Callable[[], asyncio.Protocol]) -> int:
         """Listen on every address of a host, and return the port.
@@ -91,7 +89,7 @@ class Gate:
             task.cancel()
         for stranger in list(self._strangers):
             stranger.abort()
-        self._let_go(len(self._refused))
+        self._quiet.make_room(len(self._quiet))
 
     async def end(self) -> None:
         """Break off what is open still: over TLS a farewell may wait for an answer."""
@@ -115,7 +113,7 @@ class Gate:
     def entered(self, connection: Connection) -> None:
         """Count a connection that was made."""
         self._connections[connection.transport] = connection
-        self._strangers[connection] = None
+        self._strangers[connection] = connection.source
 
     def left(self, connection: Connection) -> None:
         """Forget a connection that was lost."""
@@ -130,32 +128,32 @@ class Gate:
                 return
             except OSError as error:
                 self._faults.add(error)
-                if self._refused:
-                    self._let_go(len(self._refused))
+                if self._quiet:
+                    self._quiet.make_room(_AT_ONCE)
                 elif self._strangers:
                     self._make_room(_AT_ONCE)  # which is there when this is called again
                 else:
                     self._loop.remove_reader(listener)
                     self._loop.call_later(_PAUSE_S, self._resume, listener)
                 return
-            self._admit(taken, address)
+            taken.setblocking(False)
+            self._quiet.add(taken, source_of(address))
 
     def _resume(self, listener: socket.socket) -> None:
         if listener in self._listeners:
             self._loop.add_reader(listener, self._accept, listener)
 
-    def _admit(self, taken: socket.socket, address: str) -> None:
-        source = source_of(address)
+    def _admit(self, taken: socket.socket, source: str) -> bool:
+        """Make a connection of a socket, unless its source has made too many."""
         if not self._allowances.take(source, self._loop.time()):
-            self._refuse(taken)
-            return
+            return False
         self._make_room(len(self._strangers) + 1 - MAX_STRANGERS)
         for oldest in islice(self._entering, max(0, len(self._entering) + 1 - MAX_ENTERING)):
             oldest.cancel()
-        taken.setblocking(False)
         entering = self._loop.create_task(self._enter(taken, source))
         self._entering[entering] = None
         entering.add_done_callback(lambda task: self._entered(task, taken))
+        return True
 
     def _entered(self, entering: asyncio.Task, taken: socket.socket) -> None:
         del self._entering[entering]
@@ -172,25 +170,9 @@ class Gate:
                 ssl_handshake_timeout=ANSWERED_WITHIN_S if self._tls else None,
             )
 
-    def _refuse(self, taken: socket.socket) -> None:
-        """Hold a connection for a while, then close it."""
-        self._let_go(len(self._refused) + 1 - _MAX_REFUSED)
-        self._refused[taken] = None
-        self._loop.call_later(_REFUSED_S, self._close, taken)
-
-    def _let_go(self, count: int) -> None:
-        """Close the oldest of those that are held."""
-        for taken in list(islice(self._refused, max(0, count))):
-            self._close(taken)
-
-    def _close(self, taken: socket.socket) -> None:
-        self._refused.pop(taken, None)
-        taken.close()
-
     def _make_room(self, count: int) -> None:
         """Let strangers go, the oldest of the source that has the most."""
         for _ in range(min(count, len(self._strangers))):
-            ((source, _),) = Counter(c.source for c in self._strangers).most_common(1)
-            oldest = next(c for c in self._strangers if c.source == source)
+            oldest = oldest_of_most(self._strangers)
             del self._strangers[oldest]
             oldest.abort()

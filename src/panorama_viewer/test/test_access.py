@@ -8,7 +8,7 @@ import aiohttp
 import pytest
 from serving import DEADLINE_S, address, here, picture, request, state, token, visit
 
-from panorama_viewer import browser, connection
+from panorama_viewer import browser, connection, gate, quiet_sockets
 
 REFUSED, LATER = 1008, 1013
 
@@ -100,11 +100,31 @@ def test_who_has_the_token_gets_the_place_of_one_who_has_not(serve):
 
 @pytest.mark.parametrize('said', [b'', b'GET / HTTP/1.1\r\nHost: localhost\r\n'])
 def test_a_connection_without_a_request_ends(serve, monkeypatch, said):
-    monkeypatch.setattr(connection, 'ANSWERED_WITHIN_S', 0.2)
+    for module in (connection, quiet_sockets):
+        monkeypatch.setattr(module, 'ANSWERED_WITHIN_S', 0.2)
     port = int(re.search(r':(\d+)/', serve().url)[1])
     with socket.create_connection(('127.0.0.1', port), timeout=DEADLINE_S) as client:
         client.sendall(said)
         assert client.recv(1) == b''
+
+
+def test_who_says_nothing_takes_no_place_of_those_who_ask(serve, monkeypatch):
+    monkeypatch.setattr(quiet_sockets, 'MAX_QUIET', 2)
+    monkeypatch.setattr(gate, 'MAX_STRANGERS', 1)
+    server = serve()
+    place = '127.0.0.1', int(re.search(r':(\d+)/', server.url)[1])
+    asking, *silent = [socket.create_connection(place, timeout=DEADLINE_S) for _ in range(2)]
+    asking.sendall(b'GET / HTTP/1.1\r\nHost: localhost\r\n\r\n')
+    assert asking.recv(15) == b'HTTP/1.1 200 OK'
+    silent += [socket.create_connection(place, timeout=DEADLINE_S) for _ in range(2)]
+    assert silent[0].recv(1) == b'', 'the oldest goes'
+    assert asking.recv(1)
+    for client in silent[1:]:
+        client.setblocking(False)
+        with pytest.raises(BlockingIOError):
+            client.recv(1)
+    for client in (asking, *silent):
+        client.close()
 
 
 def test_a_page_that_draws_nothing_leaves_its_place(serve, monkeypatch):
