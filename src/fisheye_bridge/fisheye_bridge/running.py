@@ -99,7 +99,7 @@ class _Process:
         """Spin a node until the end, or until it has to connect anew."""
         executor = None
         bad_ports: list[str] = []
-        links = Links()
+        links, ports = Links(), shared_memory.OwnPorts()
         self._watchdog.feed()
         _init(self._node_class)
         try:
@@ -114,9 +114,11 @@ class _Process:
                     node.get_logger().info('ending, as the process that started this node did')
                     self._end()
                 reason = links.changed(refresh)
-                if not reason and self._tries < _TRIES and (reason := hearing.silence()):
-                    self._tries += 1
-                    bad_ports = shared_memory.own_ports()
+                if not reason and self._tries < _TRIES:
+                    reason = hearing.silence() or ports.lost()
+                    if reason:
+                        self._tries += 1
+                        bad_ports = shared_memory.own_ports()
                 if reason:
                     node.get_logger().warning(f'{reason}: connecting anew')
                     break

@@ -3,6 +3,7 @@
 import fcntl
 import os
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -17,6 +18,7 @@ _VARIABLE = 'FASTRTPS_DEFAULT_PROFILES_FILE'
 _REMEDY = 'in a container: --shm-size=1g'
 _YOUNG_S = 1.0
 """Whoever makes a lock needs a moment until it is locked."""
+_LOOK_S = 1.0
 
 
 def prepare(folder: Path = FOLDER) -> str:
@@ -66,6 +68,47 @@ def own_ports() -> list[str]:
             if Path(target).name.startswith('fastrtps_port') and target.endswith('_el'):
                 held.append(target)
     return held
+
+
+class OwnPorts:
+    """Watches whether others still find the ports at which this process listens.
+
+    Who clears up after a killed process may do so just when its successor has made a port of the
+    same name: the successor keeps a file without a name, and hears of nobody. It cannot miss
+    whom it does not know.
+    """
+
+    def __init__(self, now_s: Callable[[], float] = time.monotonic):
+        self._now_s = now_s
+        self._due_s = now_s() + _LOOK_S
+        self._suspect: set[str] = set()
+
+    def lost(self) -> str:
+        """Return that a port is lost, as seen in two looks a second apart; '' if none is."""
+        if self._now_s() < self._due_s:
+            return ''
+        self._due_s = self._now_s() + _LOOK_S
+        former, self._suspect = self._suspect, _without_file(own_ports())
+        lost = former & self._suspect
+        return f'others cannot find {", ".join(sorted(lost))}' if lost else ''
+
+
+def _without_file(locks: list[str]) -> set[str]:
+    """Return the ports whose name is that of another file than this process has mapped."""
+    ports = {lock.removesuffix('_el') for lock in locks}
+    mapped = set()
+    for line in Path('/proc/self/maps').read_text().splitlines():
+        fields = line.removesuffix(' (deleted)').split(maxsplit=5)
+        if fields[-1] in ports:
+            mapped.add((fields[-1], int(fields[-2])))
+    return {port for port in ports if (port, _inode(port)) not in mapped}
+
+
+def _inode(path: str) -> int:
+    try:
+        return Path(path).stat().st_ino
+    except OSError:
+        return 0
 
 
 def avoid(ports: list[str]) -> None:
