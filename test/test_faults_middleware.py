@@ -22,10 +22,10 @@ TOOLS = Path(__file__).parents[1] / 'tools'
 RATE_HZ = 30.0
 LONG = bool(os.environ.get('LONG'))
 ROUNDS = 5 if LONG else 2
-STOPS, HELD_UP = (50, 0) if LONG else (3, 1)
-"""How often a subscriber is stopped, and how often that may be noticed; it never is on a machine
-that does nothing else."""
-STOPPED_S, NOTICED_S = 1.0, 0.3
+STOPS, HELD_UP = (50, 2) if LONG else (3, 1)
+"""How often a subscriber is stopped, and how often that may be noticed: where it holds the lock of
+its port just then, Fast DDS waits for it up to a second, which no setting changes."""
+STOPPED_S, NOTICED_S, LOCKED_S = 1.0, 0.3, 2.5
 LIVELY = 0.8
 """Share of the rate that a busy machine keeps."""
 WATCHED_S = 3.0
@@ -163,6 +163,7 @@ def test_who_is_stopped_in_a_transfer_holds_up_nobody_else(five):
         gaps_s.append(max(np.diff([*(recent_s or arrivals_s[-1:]), time.monotonic()])))
     print(f'\n{STOPS} stops: longest gaps {np.round(sorted(gaps_s)[-3:], 2)} s')
     assert sum(gap > NOTICED_S for gap in gaps_s) <= HELD_UP
+    assert max(gaps_s) < LOCKED_S
 
 
 def test_two_systems_in_two_domains_do_not_meet(rig, watcher, domain, tmp_path):
