@@ -22,7 +22,7 @@ from fisheye_testing.image_message import to_message
 from fisheye_testing.waiting import wait_for
 from fisheye_undistort.undistort_settings import UndistortSettings
 
-EXAMPLES, FEW = (1000, 1000) if os.environ.get('LONG') else (200, 50)
+EXAMPLES, FEW = (1000, 3000) if os.environ.get('LONG') else (200, 50)
 TAKEN = 0.9
 """Share of the nonsense that is surely taken: a busy machine may skip some of it."""
 FLAT_MIB = 5.0
