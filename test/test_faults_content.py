@@ -52,7 +52,6 @@ SCALARS = [
 
 examples = settings(
     max_examples=EXAMPLES,
-    deadline=None,
     database=None,
     suppress_health_check=list(HealthCheck),
 )

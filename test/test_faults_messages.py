@@ -60,7 +60,6 @@ def repeated(field, send, strategies, examples):
 
     @settings(
         max_examples=examples,
-        deadline=None,
         database=None,
         suppress_health_check=list(HealthCheck),
     )

@@ -40,7 +40,7 @@ changes = st.lists(
 )
 
 
-@settings(max_examples=500, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=500, suppress_health_check=list(HealthCheck))
 @given(changes=changes)
 @example(changes=[(0, len(FILE), '[image]\nwidth\nnan\n[left]\ndistortion\n0 0 0 0 0')])
 def test_a_file_that_was_changed_anyhow_is_read_or_refused(tmp_path_factory, changes):

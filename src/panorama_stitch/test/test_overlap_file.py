@@ -141,7 +141,7 @@ def test_what_no_rig_can_have_is_refused(path):
             read_overlaps(path, CAMERAS, SURFACES)
 
 
-@settings(max_examples=500, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=500, suppress_health_check=list(HealthCheck))
 @given(
     at=st.integers(0, 1500),
     count=st.integers(0, 40),
