@@ -32,7 +32,9 @@ def test_parameters_are_answered_while_an_overlap_is_measured(rig, health):
     ask = health.node.create_client(GetParameters, 'stitch/get_parameters')
     wait_for(lambda: measure.service_is_ready() and ask.service_is_ready(), START_S, 'services')
     meanwhile, successes, answer_s, measured_s = 0, 0, [], []
-    for _ in range(TRIES):
+    deadline_s = monotonic() + START_S
+    while len(measured_s) < TRIES or not successes:
+        assert monotonic() < deadline_s, 'no measurement was made'
         begin_s = monotonic()
         measured = measure.call_async(CalibrateOverlap.Request())
         while not measured.done():
@@ -44,10 +46,8 @@ def test_parameters_are_answered_while_an_overlap_is_measured(rig, health):
         measured_s.append(monotonic() - begin_s)
         successes += measured.result().success
     print(
-        f'\n{meanwhile} answers came during {TRIES} measurements, the slowest after '
+        f'\n{meanwhile} answers came during {len(measured_s)} measurements, the slowest after '
         f'{max(answer_s):.2f} s; {successes} measurements were made, the slowest answer after '
         f'{max(measured_s):.2f} s'
     )
-    # Until the cameras' image circles are known there may be nothing to measure on.
-    assert successes
     assert meanwhile > TRIES, 'parameters wait for measurements'
