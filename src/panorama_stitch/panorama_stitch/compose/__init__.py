@@ -3,7 +3,7 @@
 `build` is the recipe, `posing` gives it the views of a rig. In the order in which to read: `view`
 (one camera's pictures), `placing` (the surface around the rig) and `placed` (where each camera
 shows anything on it), `layout` and `crop` (which columns are whose), `seam` (where neighbours
-agree best), `fade` and `blend` (how they meet there), `optical_flow` and `flow` (how near things
+agree best), `fade` and `blend` (how they meet there), `disparity` and `flow` (how near things
 meet, too), `blends` (the table of these ways), `brightness` and `gain` (how they become equally
 bright), `compositor` (all of it, frame after frame). `mask` tells where a camera sees the robot
 itself.

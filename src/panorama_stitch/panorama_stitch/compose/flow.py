@@ -12,7 +12,7 @@ import numpy as np
 
 from fisheye_core.parallel import run_parallel
 from panorama_stitch.compose.blend import Alone, Feather
-from panorama_stitch.compose.optical_flow import OpticalFlow
+from panorama_stitch.compose.disparity import Disparity
 from panorama_stitch.compose.ramp import Fading, columns_of, ramp_over
 
 _ROUNDS = 3
@@ -25,8 +25,8 @@ _BAND_SHARE = 0.3
 """Height of a band in units of the strip's."""
 _TRUST_PER_FRAME = 0.05
 """Share of the way to its new value that the trust in a band goes at once."""
-_EDGE_SIDE = 5
-_EDGE_ROWS = 15
+_EDGE_SIDES, _ROUNDING = (9, 3), 1e-3
+_EDGE_ROWS = 5
 """Over so many reduced rows the edges of an overlap are evened out."""
 
 
@@ -55,20 +55,17 @@ class Flow:
         fading = ramp[:, self._fade]
         self._weights = [np.ascontiguousarray(weight) for weight in (1 - fading, fading)]
 
-        self._flow = flow = OpticalFlow(width, height)
-        both = flow.reduced((left_seen & right_seen).astype(np.float32))
-        way = np.zeros_like(flow.grid)
-        way[flow.inner] = _way(both[flow.inner] > 0.5)[..., None]
-        self._left = _Warp(flow, way, shape, slice(0, self._fade.stop))
-        self._right = _Warp(flow, 1 - way, shape, slice(self._fade.start, width))
+        self._disparity = disparity = Disparity(width, height)
+        both = disparity.reduced((left_seen & right_seen).astype(np.float32))
+        way = _way(both > 0.5)
+        self._left = _Warp(disparity, way, shape, slice(0, self._fade.stop))
+        self._right = _Warp(disparity, 1 - way, shape, slice(self._fade.start, width))
         # What one view does not show must not be drawn to where both show something.
-        inside = cv2.erode(both, np.ones((_EDGE_SIDE, _EDGE_SIDE)))
-        inside = cv2.blur(inside, (_EDGE_SIDE, _EDGE_SIDE))
-        self._strength = cv2.merge([inside, inside])
-        self._used = np.empty_like(self._strength)
+        inside = cv2.erode(np.floor(both + _ROUNDING), np.ones(_EDGE_SIDES[::-1]))
+        self._strength = cv2.blur(inside, _EDGE_SIDES)
         self._judged = (both > 0.5).astype(np.uint8)
-        self._band = 1, max(1, round(_BAND_SHARE * len(both[flow.inner]))) | 1
-        self._area = self._over_band(self._judged[flow.inner])
+        self._band = 1, max(1, round(_BAND_SHARE * len(both))) | 1
+        self._area = self._over_band(self._judged)
         self._agrees, self._counts = np.empty((2, *both.shape), np.uint8)
         self._trust: np.ndarray | None = None
 
@@ -87,12 +84,10 @@ class Flow:
             self._feather(left, right)
             return
         self._alone.fill(left, right)
-        self._flow.follow(left, right)
-        strength = self._used
-        np.copyto(strength, self._gate())
-        strength *= self._strength
+        self._disparity.follow(left, right)
+        strength = self._gate() * self._strength
         ours, theirs = self._left, self._right
-        there, back = self._flow.flows
+        there, back = self._disparity.there, self._disparity.back
         run_parallel(
             [
                 lambda: ours.draw(left, there, strength),
@@ -107,20 +102,18 @@ class Flow:
             cv2.blendLinear(*faded, *self._weights, dst=right[:, fade])
 
     def _gate(self) -> np.ndarray:
-        """(height, 1, 1): how far the flow of each row is used."""
-        inner, agrees, counts = self._flow.inner, self._agrees, self._counts
-        self._flow.judge(agrees, counts)
+        """(height, 1): how far the disparity of each row is used."""
+        agrees, counts = self._agrees, self._counts
+        self._disparity.judge(agrees, counts)
         agrees &= self._judged
         counts &= self._judged
-        agreeing = self._over_band(agrees[inner]) + _LEAST_COUNT * self._area
-        agreeing /= self._over_band(counts[inner]) + _LEAST_COUNT * self._area + 1e-6
+        agreeing = self._over_band(agrees) + _LEAST_COUNT * self._area
+        agreeing /= self._over_band(counts) + _LEAST_COUNT * self._area + 1e-6
         if self._trust is None:
             self._trust = agreeing
         self._trust += _TRUST_PER_FRAME * (agreeing - self._trust)
         gate = (self._trust - _LEAST_TRUST) / (_FULL_TRUST - _LEAST_TRUST)
-        rows = self._flow.inner[0]
-        border = (rows.start, self._flow.height - rows.stop), (0, 0)
-        return np.pad(gate.clip(0, 1), border, 'edge')[..., None]
+        return gate.clip(0, 1)
 
     def _over_band(self, where: np.ndarray) -> np.ndarray:
         """(rows, 1) share of the pixels around each row that are 1."""
@@ -157,42 +150,38 @@ class _Warp:
     """
 
     def __init__(
-        self, flow: OpticalFlow, part: np.ndarray, shape: tuple[int, int], columns: slice
+        self, disparity: Disparity, part: np.ndarray, shape: tuple[int, int], columns: slice
     ):
-        """Prepare for a `part` (flow.height, flow.width, 2) of the way to the other view."""
+        """Prepare for a `part` (disparity's height, width) of the way to the other view."""
         self.drawn = np.empty(0, np.uint8)
-        self._flow = flow
+        self._disparity = disparity
         self._back = -part
         self._columns = columns
-        self._at, self._moved = np.empty_like(flow.grid), np.empty_like(flow.grid)
+        self._at, self._moved = np.empty((2, *part.shape), np.float32)
         height, width = shape
-        inner_height, inner_width = flow.grid[flow.inner].shape[:2]
-        self._scale = self._back * np.array(
-            [width / inner_width, height / inner_height], np.float32
-        )
+        self._scale = self._back * np.float32(width / disparity.width)
         sides = np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32)
-        self._grid = np.dstack(np.meshgrid(*sides))
-        self._map = np.empty_like(self._grid)
+        self._x, rows = np.meshgrid(*sides)
+        self._rows = np.ascontiguousarray(rows[:, columns])
+        self._map = np.empty(shape, np.float32)
 
-    def draw(self, image: np.ndarray, flow: np.ndarray, strength: np.ndarray) -> None:
-        """Draw a view, moved by its part of the flow from it, as far as strength (0 to 1) says."""
-        moved = flow
+    def draw(self, image: np.ndarray, moved: np.ndarray, strength: np.ndarray) -> None:
+        """Draw a view, moved by its part of the way from it, as far as strength (0 to 1) says."""
+        whole, at = moved, self._at
         for _ in range(_ROUNDS):
-            np.multiply(self._back, moved, out=self._at)
-            self._at += self._flow.grid
-            self._flow.sample(flow, self._at, self._moved)
+            np.multiply(self._back, moved, out=at)
+            at += self._disparity.columns
+            self._disparity.sample(whole, at, self._moved)
             moved = self._moved
         moved *= self._scale
         moved *= strength
-        inner = moved[self._flow.inner]
-        size = self._map.shape[1::-1]
-        cv2.resize(inner, size, dst=self._map, interpolation=cv2.INTER_LINEAR)
+        cv2.resize(moved, self._map.shape[::-1], dst=self._map, interpolation=cv2.INTER_LINEAR)
         where = self._map[:, self._columns]
-        cv2.add(where, self._grid[:, self._columns], dst=where)
-        shape = where.shape[:2] + image.shape[2:]
+        where += self._x[:, self._columns]
+        shape = where.shape + image.shape[2:]
         if self.drawn.shape != shape:
             self.drawn = np.empty(shape, np.uint8)
         if not self.drawn.size:
             return
         border = {'borderMode': cv2.BORDER_REPLICATE}
-        cv2.remap(image, where, None, cv2.INTER_LINEAR, dst=self.drawn, **border)
+        cv2.remap(image, where, self._rows, cv2.INTER_LINEAR, dst=self.drawn, **border)
