@@ -23,8 +23,6 @@ COMING_BACK = 30
 """Frames in which flow fades in again."""
 STEADY = 1.1
 MOST_PIXELS = 168 * 150
-FINEST_LEVELS = 2
-"""The search may be a sixteenth of a pixel off."""
 SAME_LEVELS = 3
 """At its edges a view has hardly been warped."""
 
@@ -191,7 +189,7 @@ def test_strips_of_any_size(size):
 def test_fades_anywhere_in_the_strip(fade):
     left, right = moved(0)
     out = blended(Flow(EVERYWHERE, EVERYWHERE, fade), left, right)
-    assert np.abs(out.astype(int) - left).max() <= FINEST_LEVELS
+    assert np.abs(out.astype(int) - left).max() <= 1
 
 
 def test_where_no_view_shows_anything_it_stays_black():

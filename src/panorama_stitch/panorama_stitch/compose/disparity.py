@@ -18,6 +18,8 @@ _BLOCK, _SMALL_STEP, _LARGE_STEP = 3, 20, 400
 """Side of what is compared, and what a change of disparity costs by a column, and by more."""
 _SEEN_PX = 3
 """What one view alone shows has no match that matches it within so many columns."""
+_NONE = 3
+"""Sixteenths of a column that pass for none: the search rounds, and far things stay sharp."""
 _OUTLIER_SIDE = 5
 _AROUND = 17, 3
 """So many columns and rows around what is near move with it, and as many give way."""
@@ -173,9 +175,9 @@ class _View:
         """Find where the other picture shows the same, and go there by a weight."""
         found = self._search.compute(self._bordered(self.grey), self._bordered(other.grey))
         found = found[self._inner]
-        # It is far: what is near hides it from the other camera.
-        found = np.where(found == self._not_found, 0, found)
-        found = cv2.medianBlur(found, _OUTLIER_SIDE)
+        # What has no match is far: something near hides it from the other camera.
+        is_aside = (found != self._not_found) & (np.abs(found) > _NONE)
+        found = cv2.medianBlur(found * is_aside, _OUTLIER_SIDE)
         # Disparities are counted to the left, in 16ths.
         found = np.float32(found) * (-1 / cv2.StereoMatcher_DISP_SCALE)
         found = self._nearest(found, np.ones(_AROUND[::-1], np.uint8))
