@@ -17,14 +17,13 @@ from panorama_stitch.compose.ramp import Fading, columns_of, ramp_over
 
 _ROUNDS = 3
 """Of the fixed point that finds what part of a view comes to lie at a pixel."""
-_LEAST_TRUST, _FULL_TRUST = 0.4, 0.55
-"""Shares of what differs in a band of rows in which flows agree: with less all of it is wrong."""
+_DOUBT, _TRUST = 0.45, 0.55
+"""Shares of what differs in which the views agree: below the one all of it is wrong, above the
+other it is right; between them all stays as it is."""
 _LEAST_COUNT = 0.02
-"""Share of a band that is taken to agree anyway, so that little that differs counts little."""
-_BAND_SHARE = 0.3
-"""Height of a band in units of the strip's."""
+"""Share of the overlap that is taken to agree anyway, so that little that differs counts little."""
 _TRUST_PER_FRAME = 0.05
-"""Share of the way to its new value that the trust in a band goes at once."""
+"""Share of the way to its new value that the trust goes at once, and of the warp that it changes."""
 _EDGE_SIDES, _ROUNDING = (9, 3), 1e-3
 _EDGE_ROWS = 5
 """Over so many reduced rows the edges of an overlap are evened out."""
@@ -33,9 +32,10 @@ _EDGE_ROWS = 5
 class Flow:
     """Warps two views until they meet, and fades from one into the other.
 
-    What can be seen by one camera only has no flow. Where that is most of a band of rows, as with
-    things nearer than a few times the distance between the lenses, flow is wrong all over it: the
-    views fade unwarped. Trust in a band changes slowly, so that nothing flickers.
+    What can be seen by one camera only has no flow. Where that is most of what the overlap shows,
+    as with things nearer than a few times the distance between the lenses, flow is wrong all over
+    it: the views fade unwarped. All rows do so together, so that what stands upright stays
+    straight, and slowly, so that nothing flickers.
     """
 
     is_local, needs_overlap = False, True
@@ -64,10 +64,8 @@ class Flow:
         inside = cv2.erode(np.floor(both + _ROUNDING), np.ones(_EDGE_SIDES[::-1]))
         self._strength = cv2.blur(inside, _EDGE_SIDES)
         self._judged = (both > 0.5).astype(np.uint8)
-        self._band = 1, max(1, round(_BAND_SHARE * len(both))) | 1
-        self._area = self._over_band(self._judged)
         self._agrees, self._counts = np.empty((2, *both.shape), np.uint8)
-        self._trust: np.ndarray | None = None
+        self._trust, self._warped = np.nan, 0.0
 
     def __call__(
         self,
@@ -79,13 +77,13 @@ class Flow:
     ) -> None:
         """As `Blend`."""
         if economical:
-            # It fades in again, with the trust.
-            self._trust = np.zeros_like(self._area)
+            # It warps more and more again.
+            self._warped = 0.0
             self._feather(left, right)
             return
         self._alone.fill(left, right)
         self._disparity.follow(left, right)
-        strength = self._gate() * self._strength
+        strength = self._strength * np.float32(self._how_far())
         ours, theirs = self._left, self._right
         there, back = self._disparity.there, self._disparity.back
         run_parallel(
@@ -101,24 +99,22 @@ class Flow:
             faded = ours.drawn[:, fade], theirs.drawn[:, :width]
             cv2.blendLinear(*faded, *self._weights, dst=right[:, fade])
 
-    def _gate(self) -> np.ndarray:
-        """(height, 1): how far the disparity of each row is used."""
-        agrees, counts = self._agrees, self._counts
-        self._disparity.judge(agrees, counts)
-        agrees &= self._judged
-        counts &= self._judged
-        agreeing = self._over_band(agrees) + _LEAST_COUNT * self._area
-        agreeing /= self._over_band(counts) + _LEAST_COUNT * self._area + 1e-6
-        if self._trust is None:
-            self._trust = agreeing
-        self._trust += _TRUST_PER_FRAME * (agreeing - self._trust)
-        gate = (self._trust - _LEAST_TRUST) / (_FULL_TRUST - _LEAST_TRUST)
-        return gate.clip(0, 1)
-
-    def _over_band(self, where: np.ndarray) -> np.ndarray:
-        """(rows, 1) share of the pixels around each row that are 1."""
-        shares = cv2.reduce(where, 1, cv2.REDUCE_AVG, dtype=cv2.CV_32F)
-        return cv2.blur(shares, self._band).reshape(shares.shape)
+    def _how_far(self) -> float:
+        """How far the views are warped now, 0 to 1."""
+        self._disparity.judge(self._agrees, self._counts)
+        few = _LEAST_COUNT * cv2.countNonZero(self._judged) + 1e-6
+        agreeing, counting = (
+            cv2.countNonZero(each & self._judged) + few for each in (self._agrees, self._counts)
+        )
+        share = agreeing / counting
+        if np.isnan(self._trust):
+            self._trust, self._is_trusted = share, share > _TRUST
+            self._warped = float(self._is_trusted)
+        self._trust += _TRUST_PER_FRAME * (share - self._trust)
+        self._is_trusted = self._trust > (_DOUBT if self._is_trusted else _TRUST)
+        change = self._is_trusted - self._warped
+        self._warped += np.clip(change, -_TRUST_PER_FRAME, _TRUST_PER_FRAME)
+        return self._warped
 
 
 def _way(both: np.ndarray) -> np.ndarray:
