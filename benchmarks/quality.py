@@ -5,7 +5,7 @@ how much brighter than the left view the right one is beside the seam, after gai
 patches, then the mean and the worst of all rows, grey levels. The edge is the sharpest change of
 brightness from one column to the next that the scene does not show. The flicker is the standard
 deviation of the seam's brightness over time, of a still scene with noise (and the bouncing ball).
-Then rooms with near things, as `seams` says.
+Then posts and rooms with near things, as `posts` and `seams` say.
 """
 
 import argparse
@@ -17,6 +17,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 from pairs import YAWS, ImagePair, real_pairs, synthetic_pair
+from posts import judge_posts
 from seams import judge_seams
 from similarity import similarity_map
 
@@ -76,7 +77,7 @@ def main() -> int:
             )
     out.mkdir(parents=True, exist_ok=True)
     (out / 'quality.json').write_text(json.dumps([vars(each) for each in results], indent=1))
-    return report(results) | judge_seams(out)
+    return report(results) | judge_posts(out) | judge_seams(out)
 
 
 def report(results: list[Quality]) -> int:

@@ -26,6 +26,7 @@ _NOISE = 2.0
 _FLOOR_M, _CEILING_M = 1.2, -1.6
 """Below the cameras."""
 _WALL_BEHIND_M = 2.5
+_POST_TOP_M, _PAINT = -0.5, (110, 80, 200)
 _CLUTTER, _CLUTTER_DEG = 4, 20.0
 _WALK_DEG = 13.0
 _TURN_DEG_PER_FRAME = 0.5
@@ -53,13 +54,16 @@ class RoomScene:
     apart_m
         Distance between the two lenses.
     crossing
-        One of `CROSSINGS`, or empty: the robot turns instead.
+        One of `CROSSINGS`, or empty: the robot turns instead; or a post.
+    post
+        Its radius and distance, m.
     """
 
     nearest_m: float
     apart_m: float
     crossing: str = ''
     seed: int = 1
+    post: tuple[float, float] = (0.05, 2.0)
 
     def shots(self, count: int = FRAMES) -> Iterator[Shot]:
         """Yield what is seen, moment after moment."""
@@ -110,6 +114,10 @@ class RoomScene:
     def _crossing(self, bearing: float) -> list:
         """Make what crosses, as it is when its middle is seen at that bearing."""
         texture = _clothes(self.seed)
+        if self.crossing == 'post':
+            radius, z = self.post
+            paint = np.full((8, 8, 3), _PAINT, np.uint8)
+            return [Cylinder(z * np.tan(bearing), z, radius, _POST_TOP_M, _FLOOR_M, paint)]
         if self.crossing == 'pole':
             z = self.nearest_m + 0.03
             return [Cylinder(z * np.tan(bearing), z, 0.03, -1.4, _FLOOR_M, texture)]

@@ -160,7 +160,7 @@ def judged(
 
 def _judge(scene: RoomScene, shots: list[Shot], blend: str) -> SeamQuality:
     height, width = shots[0].midway.shape[:2]
-    overlap, seam = (_middle(width, degrees) for degrees in (OVERLAP_DEG, _SEAM_DEG))
+    overlap, seam = (middle(width, degrees) for degrees in (OVERLAP_DEG, _SEAM_DEG))
     strip = SeamStrip(blend, height, overlap.stop - overlap.start, FOCAL_PX)
     errors, alike, shown, ghosts, changes = [], [], [], [], []
     before = None
@@ -176,7 +176,7 @@ def _judge(scene: RoomScene, shots: list[Shot], blend: str) -> SeamQuality:
         ssim = similarity_map(out, shot.midway)
         errors.append([error[:, part].mean() for part in (overlap, seam)])
         alike.append([ssim[:, part].mean() for part in (overlap, seam)])
-        ours, true = (_share(picture) for picture in (out, shot.midway))
+        ours, true = (share_of_crossing(picture) for picture in (out, shot.midway))
         if scene.crossing:
             shown.append(ours.sum() / true.sum())
             ghosts.append(max(0, _ghosts(ours) - _ghosts(true)))
@@ -201,12 +201,13 @@ def _judge(scene: RoomScene, shots: list[Shot], blend: str) -> SeamQuality:
     )
 
 
-def _middle(width: int, degrees: float) -> slice:
+def middle(width: int, degrees: float) -> slice:
+    """Return the columns of so many degrees in the middle of a view."""
     half = np.radians(degrees / 2) * FOCAL_PX
     return slice(round(width / 2 - half), round(width / 2 + half))
 
 
-def _share(image: np.ndarray) -> np.ndarray:
+def share_of_crossing(image: np.ndarray) -> np.ndarray:
     """How much of each pixel shows who crosses."""
     return (np.float32(image[..., 2]) - image[..., 1]) / CHROMA
 

@@ -19,6 +19,9 @@ FAITHFUL_DB = 30.0
 GAIN_DB = 5.0
 SHOWN = 0.8, 1.15
 """The share of a thing that is seen: it is squeezed by 12 px in 112, and its outlines waver."""
+STRAIGHT_PX = 0.8
+POST_SHOWN = 0.7, 1.1
+"""A post is displaced by a fifth of the overlap at most, and squeezed by as much."""
 COMING_BACK = 30
 """Frames in which flow fades in again."""
 STEADY = 1.1
@@ -54,6 +57,26 @@ def with_a_thing(at, by_px, width=36):
         view[60:240, begin : begin + width] = thing.clip(0, 255)
         views.append(view)
     return views
+
+
+def with_a_post(at, by_px, width=12):
+    """Two views of a far wall and of a plain post before it, which is displaced by its width."""
+    views = []
+    for middle in (at + by_px / 2, at - by_px / 2):
+        view = texture(2)
+        begin = round(middle - width / 2)
+        view[60:, begin : begin + width] = np.uint8([130, 80, 180])
+        views.append(view)
+    return views
+
+
+def strayed(image):
+    """How far the edges of a post stray from upright, px, root mean square."""
+    share = (np.float32(image[70:, :, 2]) - image[70:, :, 1]) / CHROMA
+    share[share < 5 * NOISE / CHROMA] = 0
+    widths = share.sum(axis=1)
+    middles = share @ np.arange(WIDTH) / widths
+    return max(np.std(middles - widths / 2), np.std(middles + widths / 2))
 
 
 def shown(image, width=36):
@@ -117,6 +140,15 @@ def test_a_near_thing_that_crosses_stays_whole():
         faded.append(shown(blended(feather(), *views)))
     assert SHOWN[0] <= min(ours) <= max(ours) <= SHOWN[1]
     assert min(faded) < SHOWN[0] - 0.1
+
+
+@pytest.mark.parametrize('by_px', [8, 14, 20])
+def test_a_post_stays_straight_and_whole(by_px):
+    for at in range(30, 84, 6):
+        views = [noisy(view, at) for view in with_a_post(at, by_px)]
+        out = blended(flow(), *views)
+        assert strayed(out) < STRAIGHT_PX, at
+        assert POST_SHOWN[0] < shown(out, 12) * 180 / 240 < POST_SHOWN[1], at
 
 
 def test_views_of_different_things_fade_unwarped():

@@ -21,9 +21,9 @@ _DOUBT, _TRUST = 0.45, 0.55
 """Shares of what differs in which the views agree: below the one all of it is wrong, above the
 other it is right; between them all stays as it is."""
 _LEAST_COUNT = 0.02
-"""Share of the overlap that is taken to agree anyway, so that little that differs counts little."""
+"""Share of the overlap that agrees in any case: where little differs it counts little."""
 _TRUST_PER_FRAME = 0.05
-"""Share of the way to its new value that the trust goes at once, and of the warp that it changes."""
+"""Share of the way to its new value that the trust goes at once, and most change of the warp."""
 _EDGE_SIDES, _ROUNDING = (9, 3), 1e-3
 _EDGE_ROWS = 5
 """Over so many reduced rows the edges of an overlap are evened out."""
