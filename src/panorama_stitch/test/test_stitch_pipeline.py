@@ -29,7 +29,7 @@ def test_pairs_become_panoramas_with_a_measured_offset(make_line, pictures):
 
 
 def test_a_silent_camera_is_shown_as_such_and_comes_back(make_line, pictures):
-    line = make_line()
+    line = make_line(replace(SETTINGS, blend='feather'))  # flow settles over some frames
     line.feed(pictures, lambda: line.published, 'a panorama')
     bright = line.published[-1][1]
     left = {'left': pictures['left']}

@@ -149,6 +149,13 @@ class _View:
         # Pixels are left out whose match might be beyond the edge.
         self._border = 0, 0, max(0, first + _RANGE), max(0, -first)
         self._inner = np.s_[:, self._border[2] : self._border[2] + frame.width]
+        bordered = frame.height, frame.width + sum(self._border)
+        self._bordered = np.empty((2, *bordered), np.uint8)
+        self._disparity = np.empty(bordered, np.int16)
+        self._kept, self._steady = np.empty((2, *shape), np.int16)
+        self._is, self._has_match = np.empty((2, *shape), np.bool_)
+        self._found, self._near = np.empty((2, *shape), np.float32)
+        self._around = np.ones(_AROUND[::-1], np.uint8)
         self._search = cv2.StereoSGBM_create(
             minDisparity=first,
             numDisparities=_RANGE,
@@ -173,18 +180,20 @@ class _View:
 
     def follow(self, other: '_View', weight: np.ndarray) -> None:
         """Find where the other picture shows the same, and go there by a weight."""
-        found = self._search.compute(self._bordered(self.grey), self._bordered(other.grey))
-        found = found[self._inner]
+        for grey, bordered in zip((self.grey, other.grey), self._bordered, strict=True):
+            cv2.copyMakeBorder(grey, *self._border, cv2.BORDER_REPLICATE, dst=bordered)
+        self._search.compute(*self._bordered, self._disparity)
+        disparity, kept, found = self._disparity[self._inner], self._kept, self._found
         # What has no match is far: something near hides it from the other camera.
-        is_aside = (found != self._not_found) & (np.abs(found) > _NONE)
-        found = cv2.medianBlur(found * is_aside, _OUTLIER_SIDE)
+        np.greater(np.abs(disparity, out=kept), _NONE, out=self._is)
+        self._is &= np.not_equal(disparity, self._not_found, out=self._has_match)
+        np.multiply(disparity, self._is, out=kept)
         # Disparities are counted to the left, in 16ths.
-        found = np.float32(found) * (-1 / cv2.StereoMatcher_DISP_SCALE)
-        found = self._nearest(found, np.ones(_AROUND[::-1], np.uint8))
-        found = cv2.blur(found, _AROUND, dst=found)
+        cv2.medianBlur(kept, _OUTLIER_SIDE, dst=self._steady)
+        scale = -1 / cv2.StereoMatcher_DISP_SCALE
+        cv2.multiply(self._steady, scale, dst=found, dtype=cv2.CV_32F)
+        self._nearest(found, self._around, dst=self._near)
+        cv2.blur(self._near, _AROUND, dst=found)
         found -= self.moved
         found *= weight
         self.moved += found
-
-    def _bordered(self, grey: np.ndarray) -> np.ndarray:
-        return cv2.copyMakeBorder(grey, *self._border, cv2.BORDER_REPLICATE)

@@ -63,6 +63,7 @@ class Flow:
         # What one view does not show must not be drawn to where both show something.
         inside = cv2.erode(np.floor(both + _ROUNDING), np.ones(_EDGE_SIDES[::-1]))
         self._strength = cv2.blur(inside, _EDGE_SIDES)
+        self._used = np.empty_like(self._strength)
         self._judged = (both > 0.5).astype(np.uint8)
         self._agrees, self._counts = np.empty((2, *both.shape), np.uint8)
         self._trust, self._warped = np.nan, 0.0
@@ -83,7 +84,7 @@ class Flow:
             return
         self._alone.fill(left, right)
         self._disparity.follow(left, right)
-        strength = self._strength * np.float32(self._how_far())
+        strength = np.multiply(self._strength, np.float32(self._how_far()), out=self._used)
         ours, theirs = self._left, self._right
         there, back = self._disparity.there, self._disparity.back
         run_parallel(
@@ -101,12 +102,12 @@ class Flow:
 
     def _how_far(self) -> float:
         """How far the views are warped now, 0 to 1."""
-        self._disparity.judge(self._agrees, self._counts)
+        agrees, counts = self._agrees, self._counts
+        self._disparity.judge(agrees, counts)
+        agrees &= self._judged
+        counts &= self._judged
         few = _LEAST_COUNT * cv2.countNonZero(self._judged) + 1e-6
-        agreeing, counting = (
-            cv2.countNonZero(each & self._judged) + few for each in (self._agrees, self._counts)
-        )
-        share = agreeing / counting
+        share = (cv2.countNonZero(agrees) + few) / (cv2.countNonZero(counts) + few)
         if np.isnan(self._trust):
             self._trust, self._is_trusted = share, share > _TRUST
             self._warped = float(self._is_trusted)
@@ -173,7 +174,7 @@ class _Warp:
         moved *= strength
         cv2.resize(moved, self._map.shape[::-1], dst=self._map, interpolation=cv2.INTER_LINEAR)
         where = self._map[:, self._columns]
-        where += self._x[:, self._columns]
+        cv2.add(where, self._x[:, self._columns], dst=where)
         shape = where.shape + image.shape[2:]
         if self.drawn.shape != shape:
             self.drawn = np.empty(shape, np.uint8)

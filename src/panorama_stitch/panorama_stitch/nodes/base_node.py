@@ -12,6 +12,7 @@ from rclpy.node import Node
 from fisheye_bridge.awaiting import awaitable
 from fisheye_bridge.diagnostics import (
     ERROR,
+    OK,
     WARN,
     WARNING_PAUSE_S,
     Diagnostics,
@@ -158,7 +159,7 @@ class PanoramaBase(Node):
         for sentence in self._rig_faults():
             report.add(WARN, sentence)
         if sentence := economy_sentence(pipeline):
-            report.add(WARN, sentence)
+            report.add(OK, sentence)
         if pipeline.frames.unpaired_s > self.settings.stale_after_s:
             report.add(ERROR, unpaired_sentence(pipeline))
         ages_s = pipeline.frames.ages_s()

@@ -43,7 +43,7 @@ class PanoramaOutputSettings(ViewNames, OverlapSettings, VideoSettings):
         '', 'YAML file with the overlap: read at start, written on request.'
     )
     blend: str = setting(
-        'feather',
+        'flow',
         'How neighbours meet: none lays the right over the left as published, feather fades, '
         'multiband fades coarse detail over a wider strip than fine detail, flow warps both until '
         'near things meet.',
