@@ -9,7 +9,7 @@ _COLUMNS = 112
 """Views are reduced to about so many columns, those of 30 degrees from 640x480 px."""
 _ROWS_IN_ONE, _MOST_ROWS = 8, 100
 """Rows are reduced so many times as much: what stands upright is found as a whole."""
-_FARTHER, _RANGE = 8, 48
+_FARTHER, _RANGE = 12, 48
 """How many columns behind the far scene the search begins, and how many it goes through.
 
 The far scene need not meet exactly, and what is nearer is displaced in one direction only.

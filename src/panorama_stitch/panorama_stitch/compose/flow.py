@@ -2,7 +2,7 @@
 
 From its left edge, where the picture is the left camera's, to its right edge the overlap is seen
 from a place that wanders from the left camera to the right one: each view is warped along the
-optical flow between them by its share (S. E. Chen, L. Williams, "View interpolation for image
+disparity between them by its share (S. E. Chen, L. Williams, "View interpolation for image
 synthesis", 1993, https://doi.org/10.1145/166117.166153). In the middle both show the same, and one
 fades into the other.
 """
