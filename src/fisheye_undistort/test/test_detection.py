@@ -1,3 +1,4 @@
+import cv2
 import numpy as np
 import pytest
 from conftest import fisheye, seen_exactly
@@ -6,6 +7,7 @@ from rendered_view import Look, facing_pose, render_view, scattered_poses
 
 from fisheye_core.errors import CalibrationError
 from fisheye_undistort.detect.detection import Detector
+from fisheye_undistort.detect.partial_chessboard import find_part
 from fisheye_undistort.fit.calibration import calibrate
 from fisheye_undistort.target.target import STANDARD, TAGS, Target
 
@@ -38,6 +40,39 @@ def test_a_charuco_board_may_be_half_out_of_the_picture():
     truth = seen_exactly(lens, target, pose).points_px
     assert 8 <= len(view.ids) < len(truth)
     assert np.linalg.norm(view.points_px - truth[view.ids], axis=-1).max() < CORNER_PX
+
+
+@pytest.mark.parametrize(('turn', 'quick'), [(0.1, False), (1.7, True), (3.2, False), (4.8, True)])
+def test_a_chessboard_may_be_cut_off_by_the_edge_of_the_picture(turn, quick):
+    """Its dots tell which corners are seen, whichever way up."""
+    lens, target = fisheye(170), STANDARD['chessboard']
+    pose = facing_pose(0.2, 1.1, 130, (0.1, -0.2, turn))
+    view = Detector(target, quick=quick)('shot', render_view(lens, target, pose))
+    truth = seen_exactly(lens, target, pose).points_px
+    assert 30 <= len(view.ids) < len(truth)
+    off_px = np.linalg.norm(view.points_px - truth[view.ids], axis=-1)
+    assert np.mean(off_px < CORNER_PX) > 0.9
+    assert off_px.max() < 1
+
+
+def test_no_part_of_a_chessboard_is_taken_without_its_dots():
+    lens, target = fisheye(170), STANDARD['chessboard']
+    pose = facing_pose(0.2, 1.1, 130, (0.1, -0.2, 0.1))
+    picture = render_view(lens, target, pose)
+    # Grey over the dots leaves the squares' corners.
+    squares = np.array(target.dotted_squares)[:, ::-1] - (target.columns / 2, target.rows / 2)
+    dots_mm = np.pad(squares * target.dx_mm, ((0, 0), (0, 1)))
+    places, _ = lens.project(dots_mm @ pose.rotation.T + pose.translation_mm)
+    for place in places:
+        cv2.circle(picture, tuple(place.round().astype(int).tolist()), 6, 100, -1)
+    with pytest.raises(CalibrationError, match='no chessboard of 6 x 9'):
+        Detector(target)('shot', picture)
+
+
+def test_a_real_chessboard_without_dots_has_no_part(shun74):
+    """OpenCV sees three dots in this bent board, of which a part is seen."""
+    gray = cv2.imread(str(shun74 / 'calib-01.jpg'), cv2.IMREAD_GRAYSCALE)
+    assert not len(find_part(gray, STANDARD['chessboard'], quick=True)[1])
 
 
 def test_corners_of_tags_are_found_where_they_are_whichever_way_up():

@@ -66,7 +66,7 @@ def find_chessboard(
         tried.add(key)
         found, corners = attempt.find(small, (columns, rows), flags=attempt.flags)
         if found and len(corners) == rows * columns:
-            return _from_smaller(corners.reshape(-1, 2), scale)
+            return from_smaller(corners.reshape(-1, 2), scale)
     return None
 
 
@@ -88,6 +88,6 @@ def smaller(gray: np.ndarray, side_px: int) -> tuple[np.ndarray, float]:
     return cv2.resize(gray, size, interpolation=cv2.INTER_AREA), gray.shape[1] / size[0]
 
 
-def _from_smaller(corners: np.ndarray, scale: float) -> np.ndarray:
+def from_smaller(corners: np.ndarray, scale: float) -> np.ndarray:
     """Corners in the whole picture; integers are pixel centres."""
     return (corners.astype(float) + 0.5) * scale - 0.5

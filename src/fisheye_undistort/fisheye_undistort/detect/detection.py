@@ -10,6 +10,7 @@ from fisheye_undistort.detect.chessboard import find_chessboard
 from fisheye_undistort.detect.circle_grid import area_bands, find_circles
 from fisheye_undistort.detect.grid_order import GridNotFoundError, order_grid
 from fisheye_undistort.detect.markers import find_aprilgrid, find_charuco
+from fisheye_undistort.detect.partial_chessboard import find_part
 from fisheye_undistort.fit.estimate import TargetView
 from fisheye_undistort.target.target import Target
 
@@ -22,6 +23,9 @@ _REFINED_MARGIN = 0.9
 _REFINED_PX = (2, 15)
 _REFINED_SIDES = 1 / 100
 """Likewise at most, in sides of the picture: what was found in a smaller copy is off by more."""
+_MOST_MOVED = 0.04
+"""Corners of a part that move farther, in distances to the next one, were drawn to an edge of the
+picture, which is as sharp as that of a square."""
 _REFINED_UNTIL = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 50, 0.005)
 
 
@@ -77,12 +81,20 @@ def _circles(detector: Detector, gray: np.ndarray):
 def _chessboard(detector: Detector, gray: np.ndarray):
     target = detector.target
     corners = find_chessboard(gray, target.rows, target.columns, quick=detector.quick)
-    if corners is None:
+    ids = np.arange(len(target.cells))
+    if corners is not None:
+        return _refine(gray, corners, ids, target), ids
+    corners, ids = find_part(gray, target, quick=detector.quick)
+    if len(ids):
+        refined = _refine(gray, corners, ids, target)
+        moved = np.linalg.norm(refined - corners, axis=-1)
+        kept = moved < _MOST_MOVED * _nearest(corners, ids, target)
+        corners, ids = refined[kept], ids[kept]
+    if len(ids) < _MIN_CORNERS:
         raise CalibrationError(
             f'no chessboard of {target.rows} x {target.columns} inner corners (rows x columns)'
         )
-    ids = np.arange(len(target.cells))
-    return _refine(gray, corners, ids, target), ids
+    return corners, ids
 
 
 def _charuco(detector: Detector, gray: np.ndarray):
@@ -118,12 +130,7 @@ _FINDERS = {
 
 def _refine(gray: np.ndarray, corners: np.ndarray, ids: np.ndarray, target: Target) -> np.ndarray:
     """Place corners (N, 2) to a fraction of a pixel, each within its own squares."""
-    cells, places_mm = target.cells[ids], target.points_mm[ids]
-    neighbours = np.abs(cells[:, None] - cells).sum(axis=-1) == 1
-    distances = np.linalg.norm(corners[:, None] - corners, axis=-1)
-    apart_mm = np.linalg.norm(places_mm[:, None] - places_mm, axis=-1)
-    np.divide(distances, apart_mm, out=distances, where=neighbours)
-    nearest = target.gap_mm * np.where(neighbours, distances, np.inf).min(axis=1)
+    nearest = _nearest(corners, ids, target)
     share = _REFINED_SHARE
     if target.kind == 'charuco':
         share = min(share, _REFINED_MARGIN * (1 - target.marker_mm / target.dx_mm) / 2)
@@ -137,3 +144,13 @@ def _refine(gray: np.ndarray, corners: np.ndarray, ids: np.ndarray, target: Targ
             gray, start, (int(half), int(half)), (-1, -1), _REFINED_UNTIL
         )[:, 0]
     return refined
+
+
+def _nearest(corners: np.ndarray, ids: np.ndarray, target: Target) -> np.ndarray:
+    """Distance (N,) from corners (N, 2) to the nearest one that is printed next to them, px."""
+    cells, places_mm = target.cells[ids], target.points_mm[ids]
+    neighbours = np.abs(cells[:, None] - cells).sum(axis=-1) == 1
+    distances = np.linalg.norm(corners[:, None] - corners, axis=-1)
+    apart_mm = np.linalg.norm(places_mm[:, None] - places_mm, axis=-1)
+    np.divide(distances, apart_mm, out=distances, where=neighbours)
+    return target.gap_mm * np.where(neighbours, distances, np.inf).min(axis=1)

@@ -156,6 +156,17 @@ class Target:
             plane = (self.cells - self.cells.max(axis=0) / 2) * (self.dx_mm, self.dy_mm)
         return np.concatenate([plane, np.zeros((len(plane), 1))], axis=-1)
 
+    @property
+    def dotted_squares(self) -> tuple[tuple[int, int], ...]:
+        """Row and column of a chessboard's three squares with a dot, row after row.
+
+        A white one by the middle, the one above it and the one to its right; OpenCV 4.6 finds no
+        dots around a black one. They tell which part of the board a picture shows.
+        """
+        row, column = (self.rows + 1) // 2, (self.columns + 1) // 2
+        column -= (row + column) % 2 == 0
+        return (row - 1, column), (row, column), (row, column + 1)
+
     def name_of(self, point: int) -> str:
         """Return the row and column of a point, counted from 1 at the top left of the sheet."""
         column, row = self.cells[point]

@@ -27,6 +27,8 @@ _STRIP_MM = 14.0
 _RULER_MM = 100
 _MM_PER_INCH = 25.4
 _POINTS_PER_MM = 72 / _MM_PER_INCH
+_DOT_SIDES = 0.17
+"""Radius of a chessboard's dots, in sides of its squares: OpenCV averages 1/7, white from 1/5."""
 
 
 def write_sheet(path: str | Path, target: Target) -> str:
@@ -117,6 +119,16 @@ def _circles(target: Target):
     return [Circle(center, target.radius_mm, color='black', lw=0) for center in centers]
 
 
+def _chessboard(target: Target):
+    """Squares, and the dots that tell where a part of the board belongs."""
+    yield from _squares(target)
+    left, top, _ = target.points_mm[0] - target.dx_mm / 2
+    for row, column in target.dotted_squares:
+        color = 'white' if (row + column) % 2 == 0 else 'black'
+        center = left + column * target.dx_mm, top + row * target.dx_mm
+        yield Circle(center, _DOT_SIDES * target.dx_mm, color=color, lw=0)
+
+
 def _squares(target: Target):
     """Dark squares of a chessboard, and the markers in the white ones of a ChArUco board."""
     side = target.dx_mm
@@ -152,7 +164,7 @@ def _tags(target: Target):
 _SHAPES = {
     'circles': _circles,
     'acircles': _circles,
-    'chessboard': _squares,
+    'chessboard': _chessboard,
     'charuco': _squares,
     'aprilgrid': _tags,
 }
