@@ -9,9 +9,9 @@ from fisheye_core.command_line import exit_code, show_progress
 from fisheye_core.errors import SettingError
 from fisheye_geometry.camera_file import Camera, read_camera
 from fisheye_undistort.calibrate_options import make_parser, target_of
-from fisheye_undistort.detect.collector import Collector
 from fisheye_undistort.detect.detection import Detector
 from fisheye_undistort.detect.gathering import Gathered, gather
+from fisheye_undistort.detect.live_gathering import LiveGathering
 from fisheye_undistort.detect.pictures import read_pictures
 from fisheye_undistort.fit.angle_map import lit_part
 from fisheye_undistort.fit.calibration import calibrate
@@ -74,15 +74,14 @@ def _convert(options: argparse.Namespace) -> int:
 
 def _collected(options: argparse.Namespace) -> Gathered:
     """Collect from a topic what is shown until there is enough."""
-    target = target_of(options)
-    detector = Detector(target, options.min_area_px, options.max_area_px, quick=True)
+    detector = Detector(target_of(options), options.min_area_px, options.max_area_px, quick=True)
     try:
         from fisheye_undistort.collect_node import collect
     except ImportError as error:
         raise SettingError(f'--topic needs ROS 2: {error}') from error
-    collector = Collector(detector)
-    collect(options.topic, collector, options.views, options.half)
-    return Gathered(collector, target)
+    gathering = LiveGathering(detector)
+    collect(options.topic, gathering, options.views, options.half)
+    return gathering.gathered()
 
 
 def _gathered(options: argparse.Namespace) -> Gathered:

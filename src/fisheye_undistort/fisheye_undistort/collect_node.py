@@ -8,7 +8,7 @@ from fisheye_bridge.watching import watch
 from fisheye_core.command_line import show_progress
 from fisheye_core.encodings import converted
 from fisheye_core.errors import SettingError, SourceError
-from fisheye_undistort.detect.collector import Collector
+from fisheye_undistort.detect.live_gathering import LiveGathering
 from fisheye_undistort.detect.pictures import NamedPicture, cut
 
 _LONGEST_WAIT_S = 10.0
@@ -18,7 +18,7 @@ _LINE = 120
 
 
 class CollectNode(Node):
-    """Hands the pictures of a topic to a collector and shows how far it has come.
+    """Hands the pictures of a topic to whom gathers their views, and shows how far it has come.
 
     Attributes
     ----------
@@ -26,9 +26,9 @@ class CollectNode(Node):
         Pictures that came.
     """
 
-    def __init__(self, topic: str, collector: Collector, half: str = '', **kwargs):
+    def __init__(self, topic: str, gathering: LiveGathering, half: str = '', **kwargs):
         super().__init__('calibrate_lens', **kwargs)
-        self._collector = collector
+        self._gathering = gathering
         self._half = half
         self.count = 0
         self._subscription = ImageSubscription(self, topic, self._look)
@@ -36,11 +36,11 @@ class CollectNode(Node):
     def _look(self, image, encoding, header):
         self.count += 1
         gray = cut(converted(image, encoding, 'mono8'), self._half)
-        self._collector.add(NamedPicture(f'picture {self.count}', gray, moving=True))
-        show_progress(f'{self._collector.progress()}: {self._collector.state or "taken"}', _LINE)
+        self._gathering.add(NamedPicture(f'picture {self.count}', gray, moving=True))
+        show_progress(self._gathering.progress(), _LINE)
 
 
-def collect(topic: str, collector: Collector, views: int, half: str = '') -> None:
+def collect(topic: str, gathering: LiveGathering, views: int, half: str = '') -> None:
     """Collect views from a topic until there are enough, or until Ctrl-C.
 
     Raises
@@ -54,10 +54,10 @@ def collect(topic: str, collector: Collector, views: int, half: str = '') -> Non
         raise SettingError(f'{views} views are to be collected; expected at least 1')
 
     def see(node: CollectNode) -> None:
-        while len(collector.views) < views:
+        while len(gathering.collector.views) < views:
             _wait_for_picture(node, topic)
 
-    watch(see, CollectNode, topic, collector, half)
+    watch(see, CollectNode, topic, gathering, half)
 
 
 def _wait_for_picture(node: CollectNode, topic: str) -> None:

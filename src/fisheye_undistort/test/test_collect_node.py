@@ -10,8 +10,8 @@ from fisheye_core.errors import SettingError, SourceError
 from fisheye_testing.image_message import to_message
 from fisheye_undistort import collect_node
 from fisheye_undistort.collect_node import collect
-from fisheye_undistort.detect.collector import Collector
 from fisheye_undistort.detect.detection import Detector
+from fisheye_undistort.detect.live_gathering import LiveGathering
 from fisheye_undistort.target.target import STANDARD
 
 VIEWS = 4
@@ -44,8 +44,9 @@ def waving(paper_pictures):
 
 
 def test_views_are_collected_from_a_topic(waving, capsys):
-    collector = Collector(Detector(STANDARD['circles']))
-    collect(TOPIC, collector, VIEWS)
+    gathering = LiveGathering(Detector(STANDARD['circles']))
+    collect(TOPIC, gathering, VIEWS)
+    collector = gathering.gathered().collector
     assert len(collector.finish()) == VIEWS
     assert collector.size == (640, 480)
     told = capsys.readouterr().err
@@ -56,7 +57,7 @@ def test_views_are_collected_from_a_topic(waving, capsys):
 def test_nobody_publishes(monkeypatch):
     monkeypatch.setattr(collect_node, '_LONGEST_WAIT_S', 0.3)
     with pytest.raises(SourceError, match='no picture came on /collect_node_test/nobody'):
-        collect('/collect_node_test/nobody', Collector(Detector(STANDARD['circles'])), VIEWS)
+        collect('/collect_node_test/nobody', LiveGathering(Detector(STANDARD['circles'])), VIEWS)
 
 
 @pytest.mark.parametrize(
@@ -64,4 +65,4 @@ def test_nobody_publishes(monkeypatch):
 )
 def test_what_cannot_be_collected(topic, views, told):
     with pytest.raises(SettingError, match=told):
-        collect(topic, Collector(Detector(STANDARD['circles'])), views)
+        collect(topic, LiveGathering(Detector(STANDARD['circles'])), views)

@@ -67,8 +67,7 @@ def gather(
     collector, missed = _collect(first, detector, progress)
     other, seen = guess(missed, detector) if missed and not collector.found_any else (None, '')
     detector = replace(detector, target=other or detector.target)
-    shown = detector.target
-    note = f'the pictures show {shown}; {asked} was asked for' if shown != asked else ''
+    note = note_of(detector.target, asked)
     collector, missed = _collect(read(), detector, progress)
     if not collector.found_any and seen:
         raise CalibrationError(
@@ -79,6 +78,11 @@ def gather(
         _, seen = guess(missed, detector)
         note = f'pictures without the target show {seen}' if seen else ''
     return Gathered(collector, detector.target, note)
+
+
+def note_of(shown: Target, asked: Target) -> str:
+    """Return what the user should know of the target that pictures show."""
+    return f'the pictures show {shown}; {asked} was asked for' if shown != asked else ''
 
 
 def _readable(pictures: Iterable[NamedPicture]) -> list[NamedPicture]:

@@ -45,7 +45,7 @@ def find_part(
         found, corners, cells = cv2.findChessboardCornersSBWithMeta(small, _FEWEST, _FLAGS)
         if found:
             grid = corners.reshape(*cells.shape, 2)
-            part = _placed(grid, _dots(small, grid), target)
+            part = _placed(grid, _dots(small, grid), target, small.shape)
             part = from_smaller(part[0], scale), part[1]
             best = max(best, part, key=lambda found: len(found[1]))
         if scale <= 1:
@@ -69,26 +69,34 @@ def _dots(gray: np.ndarray, grid: np.ndarray) -> np.ndarray:
     return (middle - square) * np.sign(beside - square) > _DOT * np.abs(beside - square)
 
 
-def _placed(grid: np.ndarray, dots: np.ndarray, target: Target):
+def _placed(grid: np.ndarray, dots: np.ndarray, target: Target, shape: tuple[int, ...]):
     """Number corners (n, m, 2) by where the squares with dots (n - 1, m - 1) are."""
     across, down = grid[0, -1] - grid[0, 0], grid[-1, 0] - grid[0, 0]
     if across[0] * down[1] < across[1] * down[0]:  # mirrored, as no camera sees it
         grid, dots = grid.swapaxes(0, 1), dots.T
     squares = np.array(target.dotted_squares)
-    shape = squares - squares.min(axis=0)
+    pattern = squares - squares.min(axis=0)
     for _ in range(4):
         found = np.argwhere(dots)
-        if len(found) == len(shape) and np.array_equal(found - found.min(axis=0), shape):
+        if len(found) == len(pattern) and np.array_equal(found - found.min(axis=0), pattern):
             # The square of row 1 and column 1 has the first inner corner at its upper left.
-            return _numbered(grid, squares[0] - 1 - found[0], target)
+            return _numbered(grid, squares[0] - 1 - found[0], target, shape)
         grid, dots = np.rot90(grid), np.rot90(dots)
     return _NONE
 
 
-def _numbered(grid: np.ndarray, first: np.ndarray, target: Target):
-    """Number corners (n, m, 2) from the row and column of the first, if the board has them all."""
+def _numbered(grid: np.ndarray, first: np.ndarray, target: Target, shape: tuple[int, ...]):
+    """Number corners (n, m, 2) from the row and column of the first.
+
+    The others must be beyond the edges of the picture, or the board is of another size.
+    """
     last = first + grid.shape[:2]
-    if first.min() < 0 or last[0] > target.rows or last[1] > target.columns:
+    missing = np.concatenate([first, (target.rows, target.columns) - last])
+    sides = grid, grid.swapaxes(0, 1), grid[::-1], grid.swapaxes(0, 1)[::-1]
+    # The last squares before the edge may be missed.
+    beyond = [side[0] + 2 * (side[0] - side[1]) for side in sides]
+    cut = [np.any((line < 0) | (line >= shape[::-1])) for line in beyond]
+    if missing.min() < 0 or not np.all(cut, where=missing > 0):
         return _NONE
     rows, columns = np.mgrid[first[0] : last[0], first[1] : last[1]]
     return grid.reshape(-1, 2), (rows * target.columns + columns).ravel()
