@@ -10,6 +10,7 @@ import json
 import sys
 import time
 from dataclasses import asdict, dataclass
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
@@ -151,8 +152,9 @@ def main() -> int:
     )
     results = []
     cases = [(place, off_m) for off_m in options.off_m for place in PLACES]
-    for number, (place, off_m) in enumerate(cases[:1] if options.short else cases):
-        kind = list(DISTORTIONS)[number % len(DISTORTIONS)]
+    kinds = dict(zip(PLACES, cycle(DISTORTIONS), strict=False))
+    for place, off_m in cases[:1] if options.short else cases:
+        kind = kinds[place]
         result = measure(place, off_m, kind, options.width)
         results.append(result)
         print(
