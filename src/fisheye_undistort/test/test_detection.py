@@ -55,6 +55,14 @@ def test_a_chessboard_may_be_cut_off_by_the_edge_of_the_picture(turn, quick):
     assert off_px.max() < 1
 
 
+def test_a_corner_that_opencv_guesses_outside_of_the_picture_is_left_out():
+    lens, target = foreign_lens('equisolid', 190), STANDARD['chessboard']
+    pose = facing_pose(0.543, 1.267, 177.1, (0.498, -0.062, -2.296))
+    view = Detector(target)('shot', render_view(lens, target, pose, seed=22))
+    assert 30 <= len(view.ids) < 54
+    assert np.all((view.points_px > 0) & (view.points_px < (lens.width, lens.height)))
+
+
 def test_no_part_of_a_chessboard_is_taken_without_its_dots():
     lens, target = fisheye(170), STANDARD['chessboard']
     pose = facing_pose(0.2, 1.1, 130, (0.1, -0.2, 0.1))

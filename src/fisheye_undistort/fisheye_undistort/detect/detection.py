@@ -23,7 +23,7 @@ _REFINED_MARGIN = 0.9
 _REFINED_PX = (2, 15)
 _REFINED_SIDES = 1 / 100
 """Likewise at most, in sides of the picture: what was found in a smaller copy is off by more."""
-_MOST_MOVED = 0.04
+_MOST_MOVED = 0.03
 """Corners of a part that move farther, in distances to the next one, were drawn to an edge of the
 picture, which is as sharp as that of a square."""
 _REFINED_UNTIL = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 50, 0.005)

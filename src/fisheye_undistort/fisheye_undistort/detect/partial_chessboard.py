@@ -99,4 +99,6 @@ def _numbered(grid: np.ndarray, first: np.ndarray, target: Target, shape: tuple[
     if missing.min() < 0 or not np.all(cut, where=missing > 0):
         return _NONE
     rows, columns = np.mgrid[first[0] : last[0], first[1] : last[1]]
-    return grid.reshape(-1, 2), (rows * target.columns + columns).ravel()
+    # OpenCV guesses some corners from their neighbours.
+    seen = np.all((grid >= 0) & (grid <= np.array(shape[::-1]) - 1), axis=-1)
+    return grid[seen], (rows * target.columns + columns)[seen]
