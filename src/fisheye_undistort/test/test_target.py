@@ -24,6 +24,17 @@ def test_every_other_row_of_acircles_is_moved():
     assert y.tolist() == [0, 0, 20, 20, 40, 40]
 
 
+@pytest.mark.parametrize(('rows', 'columns'), [(3, 3), (3, 8), (6, 9), (7, 7)])
+def test_dots_of_a_chessboard_are_a_white_square_and_its_neighbours(rows, columns):
+    above, middle, right = Target('chessboard', rows, columns, 25, 25).dotted_squares
+    row, column = middle
+    assert (row + column) % 2 == 1
+    assert (above, right) == ((row - 1, column), (row, column + 1))
+    # With corners all around them, which the outermost squares have not.
+    assert 1 < row < rows
+    assert 0 < column < columns - 1
+
+
 def test_a_charuco_board_has_inner_corners_only():
     assert len(STANDARD['charuco'].points_mm) == 4 * 6
 
