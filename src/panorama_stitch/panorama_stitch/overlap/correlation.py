@@ -49,17 +49,6 @@ class ScoreMap:
             score[:, np.abs(self.x - self.x[column]) <= apart_px] = -1
         return found
 
-    def best_near(self, x: float, y: float, within_px: int) -> tuple[int, int]:
-        """Return the offset (x, y) with the highest score around one."""
-        rows, columns = (
-            np.flatnonzero(np.abs(axis - np.clip(at, axis[0], axis[-1])) <= within_px)
-            for axis, at in ((self.y[1:-1], y), (self.x, x))
-        )
-        rows += 1
-        part = self.score[np.ix_(rows, columns)]
-        row, column = np.unravel_index(np.argmax(part), part.shape)
-        return int(self.x[columns[column]]), int(self.y[rows[row]])
-
     def score_at(self, x: int, y: int) -> float:
         """Score of an offset of the range."""
         return float(self.score[y - self.y[0], x - self.x[0]])

@@ -40,11 +40,6 @@ class Features:
     pixels: np.ndarray
     descriptors: np.ndarray
 
-    @property
-    def rays(self) -> np.ndarray:
-        """(n, 3) unit vectors."""
-        return self.frames[:, :, 0]
-
 
 def find_features(view: OverlapView, usable: np.ndarray) -> Features:
     """Find the features of a view where `usable` (height, width) uint8 is not 0."""

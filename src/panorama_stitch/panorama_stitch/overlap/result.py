@@ -75,7 +75,3 @@ class RotationResult:
         if self.near_deg:
             words += f'; near things lie up to {self.near_deg:.1f} degrees beside far ones'
         return words
-
-    def nearest_m(self, baseline_m: float) -> float:
-        """Distance of the nearest things of the overlap for lenses that far apart."""
-        return baseline_m / np.radians(self.near_deg) if self.near_deg else np.inf
