@@ -7,6 +7,8 @@ import numpy as np
 
 RIGHT_RAD = np.radians(0.5)
 """What `right` means."""
+_LEAST_APART_RAD = np.radians(0.05)
+"""Halves that are nearer to one another agree."""
 _WEIGHTS = (
     -8.144,
     -0.162,
@@ -20,6 +22,8 @@ _WEIGHTS = (
     0.395,
     0.997,
     0.112,
+    0.0,
+    0.0,
 )
 """Of `Evidence.features`, as benchmarks/fit_confidence.py prints them."""
 
@@ -48,6 +52,10 @@ class Evidence:
         Share of those that nearness explains.
     lead
         By how much any other depth fits worse.
+    repeated
+        Share of what shows anything that repeats itself.
+    halves_rad
+        How far the scene lies elsewhere if only one half of the overlap, by height, decides.
     deviation_rad
         Largest standard deviation of the rotation.
     peak
@@ -63,12 +71,14 @@ class Evidence:
     rivalled: float
     near_share: float
     lead: float
+    repeated: float
+    halves_rad: float
     deviation_rad: float
     peak: float
 
     @property
     def features(self) -> np.ndarray:
-        """(12,) what the logistic regression works on."""
+        """(14,) what the logistic regression works on."""
         return np.array(
             [
                 1.0,
@@ -83,6 +93,8 @@ class Evidence:
                 np.log(max(self.lead, 0.0) + 0.1),
                 -np.log(self.deviation_rad),
                 np.log(1.0001 - self.peak),
+                self.repeated,
+                np.log(self.halves_rad + _LEAST_APART_RAD),
             ]
         )
 

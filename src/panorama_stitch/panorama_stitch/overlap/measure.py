@@ -11,6 +11,8 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from panorama_stitch.overlap.choice import choose
+from panorama_stitch.overlap.coarse import coarse_rotations
 from panorama_stitch.overlap.confidence import Evidence, confidence
 from panorama_stitch.overlap.correspondences import (
     Correspondences,
@@ -19,21 +21,17 @@ from panorama_stitch.overlap.correspondences import (
     static_mask,
 )
 from panorama_stitch.overlap.features import find_features
+from panorama_stitch.overlap.parallax import halves_apart
 from panorama_stitch.overlap.result import RotationResult
-from panorama_stitch.overlap.rotation import Proposal, propose_rotations
-from panorama_stitch.overlap.trial import DIM, SHARP, Stages, Trial, try_rotation
+from panorama_stitch.overlap.rotation import Proposal, added, propose_rotations
+from panorama_stitch.overlap.trial import SHARP, try_rotation
 from panorama_stitch.overlap.view import OverlapView
 
 MIN_CONFIDENCE = 0.7
 """Below it two views count as having no common scene."""
-_PROPOSALS = 8
+_PROPOSALS, _COARSE_PROPOSALS = 8, 5
 _PROPOSING = 3
 """Pairs of images in which features are looked for."""
-_CLEAR, _CLEAR_SUPPORTED, _CLEAR_AREA = 0.55, 0.3, 40.0
-"""So large a share that agrees ends the search, a smaller one where few features disagree."""
-_CLEAR_SUPPORT = 2.5
-_SIGNIFICANT = 5.0
-"""Enough that no larger patches need to be tried."""
 _SURELY_NEAR = 0.15
 """Share of the votes below which what seems near is a few wrong ones."""
 _REDUNDANT = 4.0
@@ -71,11 +69,16 @@ def measure_rotation(
     proposals = propose_rotations(matches, _PROPOSALS, near=near, within_rad=within_rad)
     if near is not None:
         proposals.append(Proposal(near, 0.0))
-    best = _best([pairs[i] for i in few], [usable[i] for i in few], proposals)
+
+    def more():
+        coarse = coarse_rotations(*pairs[0], usable[0])
+        known = {'near': near, 'within_rad': within_rad}
+        return added(proposals, coarse, _COARSE_PROPOSALS, matches, **known)
+
+    best = choose(pairs, usable, few, proposals, more)
     if best is None:
         return RotationResult(None)
-    chosen, stages, wide = best
-    close = try_rotation(pairs, usable, wide.rotation, stages.close) or wide
+    chosen, stages, wide, close = best.proposal, best.stages, best.wide, best.close
     fine = close
     for reach in dict.fromkeys((stages.fine, SHARP.fine)):
         trial = try_rotation(pairs, usable, close.rotation, reach)
@@ -96,6 +99,8 @@ def measure_rotation(
         rivalled=rivalled / len(few),
         near_share=float(close.votes.weight[close.fit.near].sum() / close.votes.weight.sum()),
         lead=min(wide.fit.lead, close.fit.lead),
+        repeated=wide.votes.repeated / max(wide.votes.textured, 1e-9),
+        halves_rad=float(halves_apart(fine.votes, fine.fit)),
         deviation_rad=float(np.sqrt(np.linalg.eigvalsh(covariance)[-1])),
         peak=float(np.mean(fine.votes.peak[fine.fit.far])) if fine.fit.far.any() else 0.0,
     )
@@ -109,26 +114,6 @@ def measure_rotation(
         votes=int(fine.fit.far.sum() + close.fit.near.sum()),
         evidence=evidence,
     )
-
-
-def _best(pairs, usable, proposals) -> tuple[Proposal, Stages, Trial] | None:
-    """Try proposals until one is clearly right; else find the one with most merit."""
-    best, most = None, 0.0
-    for stages in (SHARP, DIM):
-        for proposal in proposals:
-            trial = try_rotation(pairs, usable, proposal.matrix, stages.wide)
-            merit = trial.significance * (proposal.support + 0.1) ** 0.5 if trial else 0.0
-            if merit <= most:
-                continue
-            best, most = (proposal, stages, trial), merit
-            rival = max((one.support for one in proposals if one is not proposal), default=0.0)
-            supported = proposal.support > _CLEAR_SUPPORT * rival
-            needed = _CLEAR_SUPPORTED if supported else _CLEAR
-            if trial.explained > needed and trial.far > _CLEAR_AREA:
-                return best
-        if best and best[2].significance > _SIGNIFICANT:
-            return best
-    return best
 
 
 def _usable(left, right):

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from panorama_stitch.overlap.votes import Votes
+from panorama_stitch.overlap.votes import Votes, chosen
 
 _OUTLIER = 20.0
 """Cost of a vote that no depth explains, in squares of its standard deviation."""
@@ -29,6 +29,8 @@ _SCAN_RAD = tuple(
 """Pitch, yaw and roll of the seam that are tried."""
 _STARTS = 4
 _OTHER_RAD = np.radians(1.0)
+_HALF_MISSING_RAD = np.radians(5.0)
+"""What a half without votes counts as."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +116,26 @@ def fit_far(votes: Votes, *, scan: bool) -> Fit | None:
     best = fits[0]
     others = [f.cost for f in fits if np.linalg.norm(f.step - best.step) > _OTHER_RAD]
     return replace(best, lead=min(others, default=_OUTLIER) - best.cost)
+
+
+def halves_apart(votes: Votes, fit: Fit) -> float:
+    """How far the votes lie elsewhere if only their upper, or only their lower, half decides, rad.
+
+    What is near fills a part of the overlap: where it alone made the fit, the rest disagrees.
+    """
+    counted = fit.far | fit.near
+    if not counted.any():
+        return _HALF_MISSING_RAD
+    height = np.arctan2(votes.right[:, 1], votes.right[:, 2])
+    upper = height < np.median(height[counted])
+    fits = [fit_far(chosen(votes, half), scan=False) for half in (upper, ~upper)]
+    turn_along = _Problem(votes).turn_along
+    return max(
+        np.sqrt(np.average((turn_along @ (half.step - fit.step)) ** 2, weights=votes.weight))
+        if half
+        else _HALF_MISSING_RAD
+        for half in fits
+    )
 
 
 def _descend(problem, step) -> Fit:

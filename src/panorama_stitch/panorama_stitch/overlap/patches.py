@@ -15,6 +15,11 @@ _AREA_RAD2 = np.radians(2.5) ** 2
 """Unit in which areas are counted."""
 _LEAST_SEEN = 0.7
 _LEAST_PEAK = 0.5
+_SAME_PX, _SAME_RAD = 3, np.radians(1.0)
+"""How far away along a row another peak is another place."""
+_REPEATED, _REPEATED_CLOSE = 1.1, 0.02
+"""How much more another place may leave unexplained, and be as good: a share, and what is added.
+The patch is then no witness."""
 _NOISE_FACTOR = 0.8
 _GRAIN_PX = 4.0
 """Pixels that vary together."""
@@ -105,8 +110,9 @@ def _peaks(volume, chosen, seen, u, v, origin, block, density) -> Votes:
     edge = (j == 0) | (i == 0) | (j == inner.shape[0] - 1) | (i == inner.shape[1] - 1)
     j, i, n = j + 1, i + 1, np.arange(len(row))
     peak = scores[j, i, n]
-    keep = (peak > _LEAST_PEAK) & ~edge
-    textured = float(np.cos(u[column]).sum())
+    repeated = (peak > _LEAST_PEAK) & _repeated(scores, i, peak, density)
+    keep = (peak > _LEAST_PEAK) & ~edge & ~repeated
+    areas = [float(np.cos(u[which]).sum()) for which in (column, column[repeated])]
     row, column, j, i, peak, n = (values[keep] for values in (row, column, j, i, peak, n))
     shift, deviation = _located(scores, j, i, n, 2 * block, density)
     du, dv = ((shift + np.stack([i, j], -1) + origin) / density).T
@@ -123,9 +129,17 @@ def _peaks(volume, chosen, seen, u, v, origin, block, density) -> Votes:
         deviation,
         np.cos(u),
         peak,
-        textured,
+        *areas,
         float((seen > _LEAST_SEEN).sum(axis=0) @ np.cos(u_all)),
     )
+
+
+def _repeated(scores, i, peak, density):
+    """(n,) bool: where another place along the row is as good as the best one, in column `i`."""
+    profile = scores.max(axis=0)
+    away = np.abs(np.arange(len(profile))[:, None] - i) > max(_SAME_PX, _SAME_RAD * density)
+    unexplained = 1 - np.where(away, profile, -1.0).max(axis=0)
+    return unexplained < _REPEATED * (1 - peak) + _REPEATED_CLOSE
 
 
 def _located(scores, j, i, n, side, density):

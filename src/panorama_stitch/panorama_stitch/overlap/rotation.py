@@ -4,6 +4,7 @@ A feature with a direction, seen in two conformal pictures, gives a whole rotati
 give a sharper one. All are tried against all correspondences.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,14 +60,45 @@ def propose_rotations(
     while len(proposals) < count and score.max() > 0:
         best = hypotheses[np.argmax(score)]
         refined = _refined(best, left, right, weight)
-        miss = _misses(refined[None], left, right)[0]
-        support = float(np.maximum(0, 1 - (miss / _FINE_RAD) ** 2) @ weight)
+        support = _support(refined, left, right, weight)
         known = [_angles(one.matrix[None], refined)[0] for one in proposals]
         if _allowed(refined[None], near, within_rad)[0] and min(known, default=9) > _APART_RAD:
             proposals.append(Proposal(refined, support))
         for known in (best, refined):
             score[_angles(hypotheses, known) < _APART_RAD] = 0
     return proposals
+
+
+def added(
+    proposals: list[Proposal],
+    rotations: Iterable[np.ndarray],
+    count: int,
+    matches: Correspondences,
+    *,
+    near: np.ndarray | None,
+    within_rad: float,
+) -> list[Proposal]:
+    """Return the first `count` rotations (3, 3) that are far from all proposals and each other.
+
+    The other parameters are those of `propose_rotations`.
+    """
+    left, right = matches.left[:, :, 0], matches.right[:, :, 0]
+    weight = matches.quality * _spread(left)
+    known = [one.matrix for one in proposals]
+    found: list[Proposal] = []
+    for rotation in rotations:
+        if len(found) == count:
+            break
+        apart = min((_angles(one[None], rotation)[0] for one in known), default=9)
+        if apart > _APART_RAD and _allowed(rotation[None], near, within_rad)[0]:
+            found.append(Proposal(rotation, _support(rotation, left, right, weight)))
+            known.append(rotation)
+    return found
+
+
+def _support(rotation, left, right, weight):
+    miss = _misses(rotation[None], left, right)[0]
+    return float(np.maximum(0, 1 - (miss / _FINE_RAD) ** 2) @ weight)
 
 
 def _alike(rotations):

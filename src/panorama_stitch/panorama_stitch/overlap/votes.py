@@ -24,6 +24,8 @@ class Votes:
         (n,) correlation.
     textured
         Area that shows anything at all, whether it voted or not.
+    repeated
+        Area that shows what repeats itself, and has no vote for it.
     area
         Area of the whole overlap.
     """
@@ -36,27 +38,25 @@ class Votes:
     weight: np.ndarray
     peak: np.ndarray
     textured: float
+    repeated: float
     area: float
 
 
 _COLUMNS = ('right', 'left', 'along', 'across', 'deviation', 'weight', 'peak')
 """What there is one of for each vote."""
+_AREAS = ('textured', 'repeated', 'area')
 
 
 def no_votes() -> Votes:
     """Return an empty set."""
     none = np.zeros((0, 3))
-    return Votes(none, none, none, none, np.zeros((0, 2)), np.zeros(0), np.zeros(0), 0.0, 0.0)
+    return Votes(none, none, none, none, np.zeros((0, 2)), np.zeros(0), np.zeros(0), 0.0, 0.0, 0.0)
 
 
 def scaled(votes, area) -> Votes:
     """Set the area of every patch."""
-    return replace(
-        votes,
-        weight=votes.weight * area,
-        textured=votes.textured * area,
-        area=votes.area * area,
-    )
+    scaled_areas = {name: getattr(votes, name) * area for name in _AREAS}
+    return replace(votes, weight=votes.weight * area, **scaled_areas)
 
 
 def pooled(votes: Sequence[Votes]) -> Votes:
@@ -64,12 +64,17 @@ def pooled(votes: Sequence[Votes]) -> Votes:
     joined = {name: np.concatenate([getattr(one, name) for one in votes]) for name in _COLUMNS}
     return Votes(
         **joined,
-        **{name: sum(getattr(one, name) for one in votes) for name in ('textured', 'area')},
+        **{name: sum(getattr(one, name) for one in votes) for name in _AREAS},
     )
+
+
+def chosen(votes: Votes, which: np.ndarray) -> Votes:
+    """Keep the votes that `which` (n,) selects; the areas stay those of all."""
+    return replace(votes, **{name: getattr(votes, name)[which] for name in _COLUMNS})
 
 
 def thinned(votes: Votes, most: int) -> Votes:
     """Keep every so-many-th vote, `most` at most, each with the weight of those that it is for."""
     stride = -(-max(len(votes.peak), 1) // most)
-    kept = {name: getattr(votes, name)[::stride] for name in _COLUMNS}
-    return replace(votes, **{**kept, 'weight': kept['weight'] * stride})
+    kept = chosen(votes, np.arange(0, len(votes.peak), stride))
+    return replace(kept, weight=kept.weight * stride)

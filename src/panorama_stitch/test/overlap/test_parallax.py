@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from panorama_stitch.overlap.parallax import fit_far
+from panorama_stitch.overlap.parallax import fit_far, halves_apart
 from panorama_stitch.overlap.strips import seam_rays
 from panorama_stitch.overlap.votes import Votes
 
@@ -29,7 +29,9 @@ def votes(step, parallax_deg, seed=0) -> Votes:
     left /= np.linalg.norm(left, axis=1, keepdims=True)
     deviation = np.full((count, 2), np.radians(NOISE_DEG))
     ones = np.ones(count)
-    return Votes(right, left, along, across, deviation, ones, ones, float(count), float(count))
+    return Votes(
+        right, left, along, across, deviation, ones, ones, float(count), 0.0, float(count)
+    )
 
 
 @pytest.mark.parametrize('share', [0.0, 0.3, 0.6])
@@ -67,3 +69,12 @@ def test_the_covariance_says_what_the_votes_support():
 
 def test_too_few_votes_give_no_answer():
     assert fit_far(votes(np.zeros(3), np.zeros(3)), scan=True) is None
+
+
+def test_halves_disagree_where_one_of_them_is_near():
+    far = votes(np.zeros(3), np.zeros(300))
+    fit = fit_far(far, scan=False)
+    assert np.degrees(halves_apart(far, fit)) < SHARP_DEG
+    # So little that it passes for far, and draws the whole fit with it.
+    floor = votes(np.zeros(3), np.where(far.right[:, 1] > 0, 0.4, 0.0))
+    assert np.degrees(halves_apart(floor, fit_far(floor, scan=False))) > 2 * SHARP_DEG
