@@ -10,10 +10,11 @@ from panorama_stitch.overlap.view import OverlapView
 _CLEAR, _CLEAR_SUPPORTED, _CLEAR_AREA = 0.55, 0.3, 40.0
 """So large a share that agrees ends the search, a smaller one where few features disagree."""
 _CLEAR_SUPPORT = 2.5
-_FINALISTS = 3
+_FINALISTS = 2
 """Where none is clear, so many are looked at closely: from afar a near thing may look better."""
 _SIGNIFICANT = 5.0
-"""Enough that no larger patches need to be tried."""
+"""Enough that no larger patches need to be tried; else they are on the `_DIM` best."""
+_DIM = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +47,9 @@ def choose(
     """
     first = [pairs[i] for i in few], [usable[i] for i in few]
     best, most = None, 0.0
+    untried = proposals
     for stages in (SHARP, DIM):
-        trials, clear = _try(first, stages, proposals, proposals)
+        trials, clear = _try(first, stages, untried, proposals)
         if stages is SHARP and not clear:
             others = more()
             proposals = [*proposals, *others]
@@ -61,6 +63,7 @@ def choose(
                 best, most = Candidate(proposal, stages, wide, close), merit
         if clear or (best and best.close.significance > _SIGNIFICANT):
             break
+        untried = [one for _, one, _ in trials[:_DIM]] or proposals
     return best
 
 

@@ -10,20 +10,17 @@ RIGHT_RAD = np.radians(0.5)
 _LEAST_APART_RAD = np.radians(0.05)
 """Halves that are nearer to one another agree."""
 _WEIGHTS = (
-    -8.144,
-    -0.162,
-    1.343,
-    3.912,
-    4.200,
-    0.026,
-    -0.661,
-    1.485,
-    -0.624,
-    0.395,
-    0.997,
-    0.112,
-    0.0,
-    0.0,
+    -13.062,
+    -0.922,
+    5.386,
+    2.513,
+    0.299,
+    0.688,
+    1.588,
+    0.470,
+    -0.797,
+    0.878,
+    0.647,
 )
 """Of `Evidence.features`, as benchmarks/fit_confidence.py prints them."""
 
@@ -42,8 +39,6 @@ class Evidence:
         The same of all that shows anything.
     coverage
         The same of the whole overlap.
-    coarse_share
-        The same of all that voted within some degrees of the answer.
     support
         Weight of the matched features that proposed it.
     rivalled
@@ -52,10 +47,12 @@ class Evidence:
         Share of those that nearness explains.
     lead
         By how much any other depth fits worse.
-    repeated
-        Share of what shows anything that repeats itself.
     halves_rad
         How far the scene lies elsewhere if only one half of the overlap, by height, decides.
+    accounted
+        Share of what shows anything that agrees or is near, in that half where it is less.
+    significance
+        By how many deviations more agrees than by chance, of all within some degrees; of one pair.
     deviation_rad
         Largest standard deviation of the rotation.
     peak
@@ -66,35 +63,32 @@ class Evidence:
     share: float
     explained: float
     coverage: float
-    coarse_share: float
     support: float
     rivalled: float
     near_share: float
     lead: float
-    repeated: float
     halves_rad: float
+    accounted: float
+    significance: float
     deviation_rad: float
     peak: float
 
     @property
     def features(self) -> np.ndarray:
-        """(14,) what the logistic regression works on."""
+        """(11,) what the logistic regression works on."""
         return np.array(
             [
                 1.0,
                 np.log(self.far + 1.0),
                 self.share,
                 self.explained,
-                self.coverage,
-                self.coarse_share,
-                self.near_share,
                 np.log(self.support + 0.1),
                 np.log(self.rivalled + 0.1),
-                np.log(max(self.lead, 0.0) + 0.1),
                 -np.log(self.deviation_rad),
                 np.log(1.0001 - self.peak),
-                self.repeated,
                 np.log(self.halves_rad + _LEAST_APART_RAD),
+                np.log(max(self.accounted, 0.01)),
+                np.log(max(self.significance, 0.0) + 0.3),
             ]
         )
 

@@ -1,7 +1,7 @@
 """The rotation between two neighbouring cameras, measured on one or more pairs of their images.
 
-Features propose rotations; local votes on the overlap that each would make choose among them, and
-fix the one at which the far scene agrees.
+Features, or coarse pictures where these are few, propose rotations; local votes on the overlap
+that each would make choose among them, and fix the one at which the far scene agrees.
 """
 
 from collections.abc import Sequence
@@ -94,13 +94,13 @@ def measure_rotation(
         share=fine.share,
         explained=fine.explained,
         coverage=fine.far / max(fine.votes.area, 1e-9),
-        coarse_share=close.share,
         support=chosen.support / len(few),
         rivalled=rivalled / len(few),
         near_share=float(close.votes.weight[close.fit.near].sum() / close.votes.weight.sum()),
         lead=min(wide.fit.lead, close.fit.lead),
-        repeated=wide.votes.repeated / max(wide.votes.textured, 1e-9),
         halves_rad=float(halves_apart(fine.votes, fine.fit)),
+        accounted=float(close.accounted),
+        significance=float(wide.significance) / len(few) ** 0.5,
         deviation_rad=float(np.sqrt(np.linalg.eigvalsh(covariance)[-1])),
         peak=float(np.mean(fine.votes.peak[fine.fit.far])) if fine.fit.far.any() else 0.0,
     )

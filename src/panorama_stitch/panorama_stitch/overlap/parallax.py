@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from panorama_stitch.overlap.votes import Votes, chosen
+from panorama_stitch.overlap.votes import Votes, chosen, thinned
 
 _OUTLIER = 20.0
 """Cost of a vote that no depth explains, in squares of its standard deviation."""
@@ -27,6 +27,8 @@ _SCAN_RAD = tuple(
     for low, high, step in ((-2, 2, 0.5), (-8, 4, 0.4), (-3, 3, 0.75))
 )
 """Pitch, yaw and roll of the seam that are tried."""
+_SCANNED = 150
+"""So many votes are enough to tell which of these are worth trying."""
 _STARTS = 4
 _OTHER_RAD = np.radians(1.0)
 _HALF_MISSING_RAD = np.radians(5.0)
@@ -107,7 +109,7 @@ def fit_far(votes: Votes, *, scan: bool) -> Fit | None:
     starts = np.zeros((1, 3))
     if scan:
         grid = np.stack(np.meshgrid(*_SCAN_RAD, indexing='ij'), -1).reshape(-1, 3)
-        cost = problem.cost(grid)
+        cost = _Problem(thinned(votes, _SCANNED)).cost(grid)
         starts = []
         while len(starts) < _STARTS and np.isfinite(cost).any():
             starts.append(grid[np.argmin(cost)])
@@ -126,8 +128,7 @@ def halves_apart(votes: Votes, fit: Fit) -> float:
     counted = fit.far | fit.near
     if not counted.any():
         return _HALF_MISSING_RAD
-    height = np.arctan2(votes.right[:, 1], votes.right[:, 2])
-    upper = height < np.median(height[counted])
+    upper = votes.height < np.median(votes.height[counted])
     fits = [fit_far(chosen(votes, half), scan=False) for half in (upper, ~upper)]
     turn_along = _Problem(votes).turn_along
     return max(

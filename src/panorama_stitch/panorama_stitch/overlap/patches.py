@@ -110,9 +110,8 @@ def _peaks(volume, chosen, seen, u, v, origin, block, density) -> Votes:
     edge = (j == 0) | (i == 0) | (j == inner.shape[0] - 1) | (i == inner.shape[1] - 1)
     j, i, n = j + 1, i + 1, np.arange(len(row))
     peak = scores[j, i, n]
-    repeated = (peak > _LEAST_PEAK) & _repeated(scores, i, peak, density)
-    keep = (peak > _LEAST_PEAK) & ~edge & ~repeated
-    areas = [float(np.cos(u[which]).sum()) for which in (column, column[repeated])]
+    keep = (peak > _LEAST_PEAK) & ~edge & ~_repeated(scores, i, peak, density)
+    shown = np.stack([v[row], np.cos(u[column])], axis=-1)
     row, column, j, i, peak, n = (values[keep] for values in (row, column, j, i, peak, n))
     shift, deviation = _located(scores, j, i, n, 2 * block, density)
     du, dv = ((shift + np.stack([i, j], -1) + origin) / density).T
@@ -129,7 +128,7 @@ def _peaks(volume, chosen, seen, u, v, origin, block, density) -> Votes:
         deviation,
         np.cos(u),
         peak,
-        *areas,
+        shown,
         float((seen > _LEAST_SEEN).sum(axis=0) @ np.cos(u_all)),
     )
 

@@ -100,6 +100,17 @@ class Trial:
         return self.far / max(self.votes.textured, 1e-9)
 
     @property
+    def accounted(self) -> float:
+        """What agrees or is near, of all that shows anything, in the half with less of it."""
+        height, area = self.votes.shown.T
+        counted = self.fit.far | self.fit.near
+        upper, voted = height < np.median(height), self.votes.height < np.median(height)
+        return min(
+            self.votes.weight[counted & those].sum() / max(area[these].sum(), 1e-9)
+            for these, those in ((upper, voted), (~upper, ~voted))
+        )
+
+    @property
     def significance(self) -> float:
         """By how many deviations more agrees than by chance."""
         chance = _CHANCE * self.votes.textured

@@ -22,10 +22,8 @@ class Votes:
         (n,) area, in squares of 2.5 degrees.
     peak
         (n,) correlation.
-    textured
-        Area that shows anything at all, whether it voted or not.
-    repeated
-        Area that shows what repeats itself, and has no vote for it.
+    shown
+        (m, 2) height, rad, and area of each patch that shows anything at all, voting or not.
     area
         Area of the whole overlap.
     """
@@ -37,35 +35,47 @@ class Votes:
     deviation: np.ndarray
     weight: np.ndarray
     peak: np.ndarray
-    textured: float
-    repeated: float
+    shown: np.ndarray
     area: float
+
+    @property
+    def height(self) -> np.ndarray:
+        """(n,) rad, angles around the line between the lenses; down is positive."""
+        return np.arctan2(self.right[:, 1], self.right[:, 2])
+
+    @property
+    def textured(self) -> float:
+        """Area that shows anything at all."""
+        return float(self.shown[:, 1].sum())
 
 
 _COLUMNS = ('right', 'left', 'along', 'across', 'deviation', 'weight', 'peak')
 """What there is one of for each vote."""
-_AREAS = ('textured', 'repeated', 'area')
 
 
 def no_votes() -> Votes:
     """Return an empty set."""
     none = np.zeros((0, 3))
-    return Votes(none, none, none, none, np.zeros((0, 2)), np.zeros(0), np.zeros(0), 0.0, 0.0, 0.0)
+    return Votes(none, none, none, none, none[:, :2], none[:, 0], none[:, 0], none[:, :2], 0.0)
 
 
 def scaled(votes, area) -> Votes:
     """Set the area of every patch."""
-    scaled_areas = {name: getattr(votes, name) * area for name in _AREAS}
-    return replace(votes, weight=votes.weight * area, **scaled_areas)
+    return replace(
+        votes,
+        weight=votes.weight * area,
+        shown=votes.shown * (1.0, area),
+        area=votes.area * area,
+    )
 
 
 def pooled(votes: Sequence[Votes]) -> Votes:
     """Put votes of several frames, in one seam frame, together."""
-    joined = {name: np.concatenate([getattr(one, name) for one in votes]) for name in _COLUMNS}
-    return Votes(
-        **joined,
-        **{name: sum(getattr(one, name) for one in votes) for name in _AREAS},
-    )
+    joined = {
+        name: np.concatenate([getattr(one, name) for one in votes])
+        for name in (*_COLUMNS, 'shown')
+    }
+    return Votes(**joined, area=sum(one.area for one in votes))
 
 
 def chosen(votes: Votes, which: np.ndarray) -> Votes:

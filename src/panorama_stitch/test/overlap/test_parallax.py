@@ -6,7 +6,8 @@ from scipy.spatial.transform import Rotation
 
 from panorama_stitch.overlap.parallax import fit_far, halves_apart
 from panorama_stitch.overlap.strips import seam_rays
-from panorama_stitch.overlap.votes import Votes
+from panorama_stitch.overlap.trial import Trial
+from panorama_stitch.overlap.votes import Votes, chosen
 
 SHARP_DEG = 0.1
 NOISE_DEG = 0.15
@@ -29,9 +30,8 @@ def votes(step, parallax_deg, seed=0) -> Votes:
     left /= np.linalg.norm(left, axis=1, keepdims=True)
     deviation = np.full((count, 2), np.radians(NOISE_DEG))
     ones = np.ones(count)
-    return Votes(
-        right, left, along, across, deviation, ones, ones, float(count), 0.0, float(count)
-    )
+    shown = np.stack([v, ones], axis=-1)
+    return Votes(right, left, along, across, deviation, ones, ones, shown, float(count))
 
 
 @pytest.mark.parametrize('share', [0.0, 0.3, 0.6])
@@ -78,3 +78,15 @@ def test_halves_disagree_where_one_of_them_is_near():
     # So little that it passes for far, and draws the whole fit with it.
     floor = votes(np.zeros(3), np.where(far.right[:, 1] > 0, 0.4, 0.0))
     assert np.degrees(halves_apart(floor, fit_far(floor, scan=False))) > 2 * SHARP_DEG
+
+
+def test_a_half_in_which_nothing_agrees_is_told():
+    all_far = votes(np.zeros(3), np.zeros(300))
+    upper = all_far.height < 0
+    halved = chosen(all_far, upper)
+    fit = fit_far(halved, scan=False)
+    whole = Trial(np.eye(3), np.eye(3), all_far, fit_far(all_far, scan=False), 1.0)
+    half = Trial(np.eye(3), np.eye(3), halved, fit, 1.0)
+    assert whole.accounted > 0.9
+    assert half.accounted < 0.1
+    assert half.explained > 0.4
