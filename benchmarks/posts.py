@@ -74,7 +74,7 @@ def scenes() -> Iterator[RoomScene]:
 
 
 def bend_and_share(image: np.ndarray, truth: np.ndarray) -> tuple[float, float]:
-    """Tell how far the edges of what is coloured stray from straight lines, and its share."""
+    """Return how far, px, edges of what is coloured stray from straight lines, and its share."""
     shown, true = (share_of_crossing(each) for each in (image, truth))
     shown[shown < _NOISE_SHARE] = 0
     rows = np.flatnonzero(true.sum(axis=1) > _LEAST_SHARE)[_END_ROWS:-_END_ROWS]

@@ -7,7 +7,7 @@ colcon test --base-paths src --parallel-workers 2 \
   --event-handlers console_cohesion+ --return-code-on-test-failure \
   --pytest-args --numprocesses 2
 packages=$?
-python -m pytest --numprocesses 2 --dist loadfile test
+python -m pytest --numprocesses 2 --dist loadfile --durations 10 test
 across=$?
 fastdds shm clean &> /dev/null  # a node that a test kills leaves its 64 MiB in /dev/shm
 if [ $packages != 0 ]; then
