@@ -123,6 +123,7 @@ class _Process:
                     node.get_logger().warning(f'{reason}: connecting anew')
                     break
         finally:
+            self._watchdog.ending()
             if executor:
                 executor.shutdown()
             if self._node:

@@ -3,13 +3,14 @@
 import faulthandler
 from time import monotonic
 
-HANGS_S = 30.0
-"""No start and no callback takes as long, even on a slow and busy machine."""
+HANGS_S, ENDS_S = 30.0, 10.0
+"""No start and no callback takes as long as the one, even on a slow and busy machine; no node as
+long as the other to end."""
 _REARM_S = 1.0
 
 
 class Watchdog:
-    """Ends the process, and prints where each thread stands, unless it is fed within `HANGS_S`.
+    """Ends the process, and prints where each thread stands, unless it is fed in time.
 
     What hangs in the middleware may hold the interpreter's lock: no other Python thread runs
     then, and no signal is handled. The timer of faulthandler needs no lock.
@@ -19,11 +20,16 @@ class Watchdog:
         self._due_s = 0.0
 
     def feed(self) -> None:
-        """Report that the process is alive."""
+        """Report that the process is alive, and will be again within `HANGS_S`."""
         now_s = monotonic()
         if now_s >= self._due_s:
             self._due_s = now_s + _REARM_S
             faulthandler.dump_traceback_later(HANGS_S, exit=True)
+
+    def ending(self) -> None:
+        """Report that a node begins to end: in Fast DDS that may hang, and never come back."""
+        self._due_s = 0.0
+        faulthandler.dump_traceback_later(ENDS_S, exit=True)
 
     def stop(self) -> None:
         """Let the process live, whatever it does."""

@@ -3,15 +3,25 @@
 import subprocess
 import sys
 
+import pytest
+
 from fisheye_testing.waiting import PATIENCE_S
 
 PROGRAM = """
 import ctypes
+import os
+import signal
 from rclpy.node import Node
 from fisheye_bridge import watchdog
 from fisheye_bridge.running import run
 
-watchdog.HANGS_S, watchdog._REARM_S = 1.0, 0.1
+watchdog.HANGS_S, watchdog.ENDS_S, watchdog._REARM_S = 1.0, 0.5, 0.1
+
+WHERE = '{where}'
+
+def hang():
+    print('hangs', flush=True)
+    ctypes.PyDLL(None).sleep(1000)
 
 class Hanging(Node):
     def __init__(self):
@@ -22,17 +32,20 @@ class Hanging(Node):
     def tick(self):
         self.ticks += 1
         if self.ticks > 150:
-            print('hangs', flush=True)
-            ctypes.PyDLL(None).sleep(1000)
+            hang() if WHERE == 'tick' else os.kill(os.getpid(), signal.SIGTERM)
+
+    def destroy_node(self):
+        hang()
 
 run(Hanging)
 """
 
 
-def test_a_node_that_hangs_ends_and_says_where():
+@pytest.mark.parametrize('where', ['tick', 'destroy_node'])
+def test_a_node_that_hangs_ends_and_says_where(where):
     """It is not ended before: its 150 ticks of 10 ms take longer than the watchdog waits."""
     process = subprocess.run(
-        [sys.executable, '-c', PROGRAM],
+        [sys.executable, '-c', PROGRAM.replace('{where}', where)],
         capture_output=True,
         text=True,
         timeout=PATIENCE_S,
@@ -40,4 +53,4 @@ def test_a_node_that_hangs_ends_and_says_where():
     )
     assert process.stdout == 'hangs\n'
     assert process.returncode == 1
-    assert ' in tick' in process.stderr
+    assert f' in {where}' in process.stderr
