@@ -114,11 +114,13 @@ class _Process:
                     node.get_logger().info('ending, as the process that started this node did')
                     self._end()
                 reason = links.changed(refresh)
-                if not reason and self._tries < _TRIES:
-                    reason = hearing.silence() or ports.lost()
-                    if reason:
-                        self._tries += 1
-                        bad_ports = shared_memory.own_ports()
+                if (
+                    not reason
+                    and self._tries < _TRIES
+                    and (reason := hearing.silence() or ports.lost())
+                ):
+                    self._tries += 1
+                    bad_ports = shared_memory.own_ports()
                 if reason:
                     node.get_logger().warning(f'{reason}: connecting anew')
                     break

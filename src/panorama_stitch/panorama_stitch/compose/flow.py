@@ -66,7 +66,7 @@ class Flow:
         self._used = np.empty_like(self._strength)
         self._judged = (both > 0.5).astype(np.uint8)
         self._agrees, self._counts = np.empty((2, *both.shape), np.uint8)
-        self._trust, self._warped = np.nan, 0.0
+        self._trust, self._is_trusted, self._warped = np.nan, False, 0.0
 
     def __call__(
         self,
