@@ -14,7 +14,8 @@ from fisheye_testing.rig import SIDES, RigProcesses
 from fisheye_testing.waiting import wait_for
 
 LONG = bool(os.environ.get('LONG'))
-RATE_HZ = 30.0
+RATE_HZ = 30.0 if LONG else 10.0
+"""What a busy machine keeps up with, but for the long form."""
 WATCHED_S = 30.0 if LONG else 5.0
 SETTLE_S = 2.0
 AWAKE_S = 4.0

@@ -17,7 +17,7 @@ setup(
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),
         (f'share/{package_name}/config', glob('config/*.xml')),
-        (f'share/{package_name}/hook', ['hook/middleware.dsv']),
+        (f'share/{package_name}/hook', ['hook/environment.dsv']),
     ],
     extras_require={'test': ['pytest']},
 )

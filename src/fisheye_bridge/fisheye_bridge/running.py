@@ -73,6 +73,7 @@ class _Process:
         self._parameters: list[Parameter] = []
         self._tries = 0
         self._watchdog = Watchdog()
+        self._ports = shared_memory.OwnPorts()
         self._parent = os.getppid() if os.environ.get(_BOUND) == '1' else None
         self._ended = threading.Event()
         for number in (signal.SIGINT, signal.SIGTERM):
@@ -98,8 +99,8 @@ class _Process:
     def _live(self) -> None:
         """Spin a node until the end, or until it has to connect anew."""
         executor = None
-        bad_ports: list[str] = []
-        links, ports = Links(), shared_memory.OwnPorts()
+        bad_ports: set[str] = set()
+        links = Links()
         self._watchdog.feed()
         _init(self._node_class)
         try:
@@ -117,10 +118,10 @@ class _Process:
                 if (
                     not reason
                     and self._tries < _TRIES
-                    and (reason := hearing.silence() or ports.lost())
+                    and (reason := hearing.silence() or self._ports.lost())
                 ):
                     self._tries += 1
-                    bad_ports = shared_memory.own_ports()
+                    bad_ports = self._ports.locks()
                 if reason:
                     node.get_logger().warning(f'{reason}: connecting anew')
                     break
@@ -135,7 +136,7 @@ class _Process:
                 self._node, self._former = None, self._node
             rclpy.try_shutdown()
             forget_machine()
-            shared_memory.avoid(bad_ports)
+            self._ports.avoid(bad_ports)
 
     def _built(self) -> Node:
         """Build the node, with the parameters that it had before and what it has found out."""

@@ -59,41 +59,53 @@ def is_fast_dds() -> bool:
     return os.environ.get('RMW_IMPLEMENTATION', 'rmw_fastrtps_cpp') == 'rmw_fastrtps_cpp'
 
 
-def own_ports() -> list[str]:
-    """Return the locks of the ports at which this process listens."""
-    held = []
-    for link in Path('/proc/self/fd').iterdir():
-        with suppress(OSError):
-            target = str(link.readlink())
-            if Path(target).name.startswith('fastrtps_port') and target.endswith('_el'):
-                held.append(target)
-    return held
-
-
 class OwnPorts:
-    """Watches whether others still find the ports at which this process listens.
-
-    Who clears up after a killed process may do so just when its successor has made a port of the
-    same name: the successor keeps a file without a name, and hears of nobody. It cannot miss
-    whom it does not know.
-    """
+    """The ports at which this process listens, each with a lock that it holds."""
 
     def __init__(self, now_s: Callable[[], float] = time.monotonic):
         self._now_s = now_s
         self._due_s = now_s() + _LOOK_S
         self._suspect: set[str] = set()
+        self._avoided: set[str] = set()
+
+    def locks(self) -> set[str]:
+        """Return the locks of the ports, which are files beside those of the ports themselves."""
+        held = set()
+        for link in Path('/proc/self/fd').iterdir():
+            with suppress(OSError):
+                target = str(link.readlink())
+                if Path(target).name.startswith('fastrtps_port') and target.endswith('_el'):
+                    held.add(target)
+        return held - self._avoided
 
     def lost(self) -> str:
-        """Return that a port is lost, as seen in two looks a second apart; '' if none is."""
+        """Return that a port is lost, as seen in two looks a second apart; '' if none is.
+
+        Who clears up after a killed process may do so just when its successor has made a port of
+        the same name: the successor keeps a file without a name, and hears of nobody. It cannot
+        miss whom it does not know.
+        """
         if self._now_s() < self._due_s:
             return ''
         self._due_s = self._now_s() + _LOOK_S
-        former, self._suspect = self._suspect, _without_file(own_ports())
+        former, self._suspect = self._suspect, _without_file(self.locks())
         lost = former & self._suspect
         return f'others cannot find {", ".join(sorted(lost))}' if lost else ''
 
+    def avoid(self, locks: set[str]) -> None:
+        """Hold locks, so that Fast DDS opens other ports; call it while no context is up.
 
-def _without_file(locks: list[str]) -> set[str]:
+        Whoever has a wrong view of a port keeps it: its next owner would be as deaf. A port whose
+        lock is held is passed over.
+        """
+        for lock in locks:
+            with suppress(OSError):
+                file = os.open(lock, os.O_RDONLY | os.O_CREAT | os.O_CLOEXEC, 0o666)
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)  # until the process ends
+        self._avoided |= locks
+
+
+def _without_file(locks: set[str]) -> set[str]:
     """Return the ports whose name is that of another file than this process has mapped."""
     ports = {lock.removesuffix('_el') for lock in locks}
     mapped = set()
@@ -109,18 +121,6 @@ def _inode(path: str) -> int:
         return Path(path).stat().st_ino
     except OSError:
         return 0
-
-
-def avoid(ports: list[str]) -> None:
-    """Hold the locks of ports, so that Fast DDS opens others; call it while no context is up.
-
-    Whoever has a wrong view of a port keeps it: its next owner would be as deaf. A port whose lock
-    is held is passed over.
-    """
-    for port in ports:
-        with suppress(OSError):
-            lock = os.open(port, os.O_RDONLY | os.O_CREAT | os.O_CLOEXEC, 0o666)
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)  # until the process ends
 
 
 def _room(folder: Path) -> int:
