@@ -37,7 +37,7 @@ def test_a_calibration_of_another_size_is_not_published(ros, write_picture, tmp_
     ros.start(source=str(write_picture('one.png', 7)), camera_info_url=str(tmp_path / 'left.yaml'))
     assert not any(ros.hear('/left/camera_info').k)
     message = ros.hear('/diagnostics').status[0].message
-    assert message == 'the calibration is for 640x480 px; the pictures have 32x24 px'
+    assert message.startswith('the calibration is for 640x480 px; the pictures have 32x24 px')
 
 
 def test_set_camera_info_writes_the_file_and_is_used_at_once(ros, write_picture, tmp_path):
