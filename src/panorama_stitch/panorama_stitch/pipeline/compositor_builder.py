@@ -4,9 +4,7 @@ from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import Future
 from dataclasses import replace
-from threading import Lock
 from time import monotonic
-from typing import NamedTuple
 
 import numpy as np
 
@@ -18,23 +16,14 @@ from panorama_stitch.overlap.overlap_file import read_overlaps, write_overlaps
 from panorama_stitch.overlap.overlap_result import Overlap
 from panorama_stitch.pipeline.overlap_choice import believed, kept
 from panorama_stitch.pipeline.panorama_settings import PanoramaOutputSettings
+from panorama_stitch.pipeline.recent_frames import RecentFrames, Remembered
 from panorama_stitch.pipeline.rig_measurement import measure_overlaps
 from panorama_stitch.pipeline.rig_state import RigState
 from panorama_stitch.pipeline.seam_watch import SeamWatch
 
-_REMEMBERED = 5
-"""Frame sets that an overlap is measured on."""
-_BETWEEN_REMEMBERED_S = 0.2
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 2.0, 60.0
 """Between two tries to find an overlap."""
 _NOTICES = 20
-
-
-class _Remembered(NamedTuple):
-    """Images of all cameras, and when the oldest of them was taken."""
-
-    images: Sequence[np.ndarray]
-    stamp_ns: int
 
 
 class CompositorBuilder:
@@ -54,10 +43,8 @@ class CompositorBuilder:
         self.trouble = ''
         self._rig, self._watch = rig, watch
         self._background = Background(self._failed)
-        self._lock = Lock()
-        self._recent: deque[_Remembered] = deque(maxlen=_REMEMBERED)
+        self._recent = RecentFrames()
         self._notices: deque[str] = deque(maxlen=_NOTICES)
-        self._remembered_s = 0.0
         self._due_s = 0.0
         self._pause_s = _FIRST_PAUSE_S
         self._job: Future | None = None
@@ -82,9 +69,9 @@ class CompositorBuilder:
         is_live
             Whether no image is stale: only such are measured.
         """
-        frames = _Remembered(images, stamp_ns)
-        if is_live:
-            self._remember(frames)
+        frames = Remembered(images, stamp_ns)
+        if is_live and self._recent.take(frames):
+            self._due_s = 0.0
         busy = self._job is not None and not self._job.done()
         if not busy and self._rig.is_complete and monotonic() >= self._due_s:
             self._due_s = float('inf')
@@ -93,8 +80,7 @@ class CompositorBuilder:
     def renew(self, *, forget: bool) -> None:
         """Request a new compositor; `forget` what the cameras showed so far."""
         if forget:
-            with self._lock:
-                self._recent.clear()
+            self._recent.forget()
         self._due_s = 0.0
 
     def calibrate(self, settings: PanoramaOutputSettings, method: str, save: bool) -> Future:
@@ -136,16 +122,6 @@ class CompositorBuilder:
         """End the thread."""
         self._background.stop()
 
-    def _remember(self, frames: _Remembered) -> None:
-        now_s = monotonic()
-        with self._lock:
-            is_first = not self._recent
-            if is_first:
-                self._due_s = 0.0
-            if is_first or now_s - self._remembered_s >= _BETWEEN_REMEMBERED_S:
-                self._remembered_s = now_s
-                self._recent.append(frames)
-
     def _failed(self, error: FisheyeError) -> None:
         self.trouble = str(error)
         self.tell(self.trouble)
@@ -156,14 +132,14 @@ class CompositorBuilder:
         self._due_s = min(self._due_s, monotonic() + pause_s)
 
     def _prepare(
-        self, newest: _Remembered, settings: PanoramaOutputSettings, is_live: bool
+        self, newest: Remembered, settings: PanoramaOutputSettings, is_live: bool
     ) -> None:
         """Find overlaps if there are none, and build the compositor that uses them."""
         rig = self._rig
         if rig.overlaps is None:
             self._read(settings.overlap_file)
         found = rig.overlaps and all(overlap.found for overlap in rig.overlaps)
-        remembered = self._remembered()
+        remembered = self._recent.all()
         if not found and settings.auto_calibrate and remembered:
             surfaces = rig.surfaces
             overlaps = self._measured(remembered, settings, settings.method)
@@ -187,7 +163,7 @@ class CompositorBuilder:
             raise OverlapError('it is not known yet what every camera sees; are all running?')
         if save and not settings.overlap_file:
             raise OverlapError('overlap_file is empty; expected the file to save the overlap in')
-        remembered, surfaces = self._remembered(), rig.surfaces
+        remembered, surfaces = self._recent.all(), rig.surfaces
         measured = self._measured(remembered, settings, method or settings.method)
         if settings.method != 'paper':
             measured = [
@@ -202,18 +178,14 @@ class CompositorBuilder:
         self._use(remembered[-1], settings)
         return measured
 
-    def _remembered(self) -> list[_Remembered]:
-        with self._lock:
-            return list(self._recent)
-
     def _measured(
-        self, remembered: list[_Remembered], settings: PanoramaOutputSettings, method: str
+        self, remembered: list[Remembered], settings: PanoramaOutputSettings, method: str
     ) -> list[Overlap]:
         images = [frames.images for frames in remembered]
         overlaps = self._watch.sharpened(measure_overlaps(self._rig, images, settings, method))
         return [replace(overlap, stamp_ns=remembered[-1].stamp_ns) for overlap in overlaps]
 
-    def _use(self, newest: _Remembered, settings: PanoramaOutputSettings) -> None:
+    def _use(self, newest: Remembered, settings: PanoramaOutputSettings) -> None:
         self.compositor = self._rig.compositor(settings, newest.images)
         self.trouble = ''
 
