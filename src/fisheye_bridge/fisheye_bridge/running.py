@@ -5,10 +5,6 @@ import signal
 import sys
 import threading
 import traceback
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from time import monotonic
-from typing import Any, TypeVar
 
 import rclpy
 from rclpy.exceptions import ParameterException
@@ -25,8 +21,6 @@ from fisheye_bridge.network import Links, forget_machine, refresher
 from fisheye_bridge.parameters import misspelt
 from fisheye_bridge.watchdog import Watchdog
 from fisheye_core.errors import FisheyeError
-
-_Node = TypeVar('_Node', bound=Node)
 
 _SWITCH_S = 0.0005
 """A thread that measures in the background leaves Python's lock to the frames so often."""
@@ -102,7 +96,7 @@ class _Process:
         bad_ports: set[str] = set()
         links = Links()
         self._watchdog.feed()
-        _init(self._node_class)
+        begin(self._node_class)
         try:
             self._node = node = self._built()
             executor = SingleThreadedExecutor()
@@ -174,38 +168,8 @@ def _logger(node_class: type[Node]):
     return nameless.get_logger()
 
 
-@contextmanager
-def started(node_class: type[_Node], *arguments: Any) -> Iterator[_Node]:
-    """Lend a node to a command, which spins it itself and is ended by a KeyboardInterrupt.
-
-    Parameters
-    ----------
-    node_class, *arguments
-        What to build, of what.
-    """
-    node = None
-    try:
-        _init(node_class)
-        node = node_class(*arguments)
-        yield node
-    finally:
-        if node:
-            node.destroy_node()
-        rclpy.try_shutdown()
-
-
-def spin_until(node: Node, condition: Callable[[], bool], timeout_s: float) -> bool:
-    """Spin until a condition holds; tell whether it did within `timeout_s`."""
-    deadline_s = monotonic() + timeout_s
-    while not condition():
-        if monotonic() > deadline_s:
-            return False
-        rclpy.spin_once(node, timeout_sec=_LONGEST_WAIT_S)
-    return True
-
-
-def _init(node_class: type[Node]) -> None:
-    """Make the first steps, in the order in which they must come."""
+def begin(node_class: type[Node]) -> None:
+    """Start the middleware for a node, in the order in which its steps must come."""
     complaint = shared_memory.prepare()
     # rclpy's own handlers would end the context while threads of the node still publish.
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)

@@ -1,16 +1,22 @@
-"""Watching image topics for a command of the shell, until it has seen enough."""
+"""Nodes of commands of the shell, which watch topics until they have seen enough."""
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from time import monotonic
 from typing import Any, TypeVar
 
+import rclpy
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 
-from fisheye_bridge.running import started
+from fisheye_bridge.running import begin
 from fisheye_core.errors import SettingError
 
 _Node = TypeVar('_Node', bound=Node)
+
+_LONGEST_WAIT_S = 0.2
+"""A condition is looked at so often, and a signal noticed."""
 
 
 def watch(see: Callable[[_Node], None], node_class: type[_Node], *arguments: Any) -> None:
@@ -41,3 +47,33 @@ def watch(see: Callable[[_Node], None], node_class: type[_Node], *arguments: Any
         pass
     finally:
         print(file=sys.stderr)
+
+
+@contextmanager
+def started(node_class: type[_Node], *arguments: Any) -> Iterator[_Node]:
+    """Lend a node to a command, which spins it itself and is ended by a KeyboardInterrupt.
+
+    Parameters
+    ----------
+    node_class, *arguments
+        What to build, of what.
+    """
+    node = None
+    try:
+        begin(node_class)
+        node = node_class(*arguments)
+        yield node
+    finally:
+        if node:
+            node.destroy_node()
+        rclpy.try_shutdown()
+
+
+def spin_until(node: Node, condition: Callable[[], bool], timeout_s: float) -> bool:
+    """Spin until a condition holds; tell whether it did within `timeout_s`."""
+    deadline_s = monotonic() + timeout_s
+    while not condition():
+        if monotonic() > deadline_s:
+            return False
+        rclpy.spin_once(node, timeout_sec=_LONGEST_WAIT_S)
+    return True

@@ -10,7 +10,8 @@ import rclpy
 from rclpy.node import Node
 
 from fisheye_bridge import running, shared_memory
-from fisheye_bridge.running import run, spin_until, started
+from fisheye_bridge.running import run
+from fisheye_bridge.watching import spin_until, started
 
 SHORT_S, LONG_S = 0.05, 10.0
 

@@ -2,9 +2,8 @@
 
 from rclpy.node import Node
 
-from fisheye_bridge.running import spin_until
 from fisheye_bridge.topics import ImageSubscription
-from fisheye_bridge.watching import watch
+from fisheye_bridge.watching import spin_until, watch
 from fisheye_core.command_line import show_progress
 from fisheye_core.encodings import converted
 from fisheye_core.errors import SettingError, SourceError

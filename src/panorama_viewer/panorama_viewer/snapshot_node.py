@@ -11,9 +11,9 @@ from rclpy.node import Node
 from fisheye_bridge.command_line import own_words
 from fisheye_bridge.projection import surface_of
 from fisheye_bridge.qos import LATCHED_INPUT
-from fisheye_bridge.running import spin_until, started
 from fisheye_bridge.stamps import ns_of
 from fisheye_bridge.topics import ImageSubscription
+from fisheye_bridge.watching import spin_until, started
 from fisheye_core.command_line import exit_code
 from fisheye_core.encodings import to_opencv
 from fisheye_core.errors import SettingError, SourceError

@@ -5,10 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 from rclpy.node import Node
 
-from fisheye_bridge.running import spin_until
 from fisheye_bridge.stamps import ns_of
 from fisheye_bridge.topics import ImageSubscription
-from fisheye_bridge.watching import watch
+from fisheye_bridge.watching import spin_until, watch
 from fisheye_core.command_line import show_progress
 from fisheye_core.encodings import converted
 from fisheye_core.errors import FisheyeError, SourceError
