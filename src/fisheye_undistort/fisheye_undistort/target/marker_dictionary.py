@@ -5,6 +5,11 @@ import cv2
 from fisheye_core.errors import SettingError
 
 
+def can_read_markers() -> bool:
+    """Return whether this OpenCV is built with what reads markers."""
+    return hasattr(cv2, 'aruco')
+
+
 def dictionary_names() -> list[str]:
     """Return OpenCV's names of the dictionaries of markers."""
     return [name for name in dir(getattr(cv2, 'aruco', None)) if name.startswith('DICT_')]
@@ -18,10 +23,10 @@ def dictionary_named(name: str):
     SettingError
         If this OpenCV cannot read markers, or knows none of this name.
     """
-    if not hasattr(cv2, 'aruco'):
+    if not can_read_markers():
         raise SettingError(
             f'the target has markers, and OpenCV {cv2.__version__} here is built without them; '
-            'expected OpenCV 4.7 or later, or another target'
+            'expected OpenCV 4.7 or later, the package opencv-contrib-python, or another target'
         )
     if name not in dictionary_names():
         raise SettingError(

@@ -9,6 +9,7 @@ from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.remap import RemapTable
 from fisheye_geometry.surface import Surface
 from panorama_stitch.turn.corners import lit
+from panorama_stitch.turn.patches import HALF_PX, find_patch, zoomed
 from panorama_stitch.turn.sightings import Sightings
 from panorama_stitch.turn.turn_state import TurnState
 
@@ -16,10 +17,6 @@ _DENSITY = 260.0
 """Pixels per radian that are enough."""
 _HIGHEST_RAD = np.radians(62)
 """Above and below, columns are too narrow."""
-_PATCH = 8
-"""Pixels from the middle of a patch to its edge."""
-_LEAST_CONTRAST = 3.0
-_MOST_ZOOM = 1.5
 _STEPS_AROUND = 720
 
 
@@ -95,18 +92,12 @@ class LevelViews:
         zoom = distance[seen.landmark] / np.linalg.norm(self._state.rays(seen), axis=1)
         found, keep = np.zeros((len(seen), 2)), np.zeros(len(seen), bool)
         for i, landmark in enumerate(seen.landmark):
+            camera, frame = reference.camera[landmark], reference.frame[landmark]
+            patch = zoomed(self._pictures[camera][frame], looks_like[landmark], zoom[i])
             picture = self._pictures[seen.camera[i]][seen.frame[i]]
-            window = _cut(picture, place[i], _PATCH + reach_px)
-            if window is None:
-                continue
-            original = self._pictures[reference.camera[landmark]][reference.frame[landmark]]
-            patch = _zoomed(original, looks_like[landmark], zoom[i])
-            if patch.std() < _LEAST_CONTRAST:
-                continue
-            best = _peak(cv2.matchTemplate(window, patch, cv2.TM_CCOEFF_NORMED))
-            if best is not None and best[2] >= least:
-                keep[i] = True
-                found[i] = np.round(place[i]) + np.array(best[:2]) - reach_px
+            there = find_patch(picture, place[i], patch, reach_px, least)
+            if there is not None:
+                keep[i], found[i] = True, there
         return self._seen_at(seen.only(keep), found[keep])
 
     def visible(self, seen: Sightings) -> np.ndarray:
@@ -115,7 +106,7 @@ class LevelViews:
         result = np.zeros(len(seen), bool)
         for camera, valid in enumerate(self._valid):
             inner = cv2.erode(
-                valid, np.ones((2 * _PATCH + 1,) * 2, np.uint8), borderType=cv2.BORDER_CONSTANT
+                valid, np.ones((2 * HALF_PX + 1,) * 2, np.uint8), borderType=cv2.BORDER_CONSTANT
             )
             mine = np.flatnonzero(seen.camera == camera)
             x, y = np.round(place[mine]).astype(int).T
@@ -155,35 +146,3 @@ def _surface(focal: float) -> Surface:
     return Surface(
         'equirectangular', width, height, width / 2 / np.pi, (width - 1) / 2, (height - 1) / 2
     )
-
-
-def _cut(picture: np.ndarray, where: np.ndarray, half: int) -> np.ndarray | None:
-    """Return the part about a place, or None where the picture ends before."""
-    x, y = np.round(where).astype(int)
-    height, width = picture.shape
-    if not (half <= x < width - half and half <= y < height - half):
-        return None
-    return picture[y - half : y + half + 1, x - half : x + half + 1]
-
-
-def _zoomed(picture: np.ndarray, where: np.ndarray, zoom: float) -> np.ndarray:
-    """Return the patch about a place, as it looks from another distance."""
-    zoom = float(np.clip(zoom, 1 / _MOST_ZOOM, _MOST_ZOOM))
-    shift = _PATCH - zoom * where
-    to_patch = np.array([[zoom, 0, shift[0]], [0, zoom, shift[1]]])
-    return cv2.warpAffine(picture, to_patch, (2 * _PATCH + 1,) * 2)
-
-
-def _peak(score: np.ndarray) -> tuple[float, float, float] | None:
-    """Return column, row and height of the highest point, to parts of a pixel; None at an edge."""
-    _, best, _, (x, y) = cv2.minMaxLoc(score)
-    if not (0 < x < score.shape[1] - 1 and 0 < y < score.shape[0] - 1):
-        return None
-    place = []
-    for at, (low, high) in (
-        (x, (score[y, x - 1], score[y, x + 1])),
-        (y, (score[y - 1, x], score[y + 1, x])),
-    ):
-        bend = low - 2 * best + high
-        place.append(at + (0.5 * (low - high) / bend if bend < 0 else 0.0))
-    return place[0], place[1], best
