@@ -83,7 +83,7 @@ def test_another_kind_of_target_is_named(asked, boards):
 
 
 def test_a_chessboard_of_another_size_is_named(boards):
-    with pytest.raises(CalibrationError, match='they show a chessboard of 6 x 9 inner corners'):
+    with pytest.raises(CalibrationError, match='they show 6 x 9 inner corners of a chessboard'):
         gather(lambda: boards[:1], Detector(replace(BOARD, rows=12, columns=13)))
 
 

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -79,7 +81,8 @@ def test_impossible_targets_are_refused_by_name(arguments, told):
     assert told in str(error.value)
 
 
-def test_an_opencv_without_markers_is_said(monkeypatch):
+def test_an_opencv_without_markers_is_said_where_they_are_needed(monkeypatch):
     monkeypatch.delattr(cv2, 'aruco')
+    assert replace(STANDARD['charuco'], rows=4).rows == 4
     with pytest.raises(SettingError, match='the target has markers, and OpenCV'):
         dictionary_named(MARKERS)

@@ -15,6 +15,8 @@ _GRID_BORDER = 2
 """Black cells around the code of Kalibr's tags; OpenCV's own markers have one."""
 _GAPS_PX = (3, 5, 9, 0)
 """White is grown by so much, that the squares between Kalibr's tags let go of their corners."""
+_MOST_FOREIGN = 0.2
+"""Share of markers that a board does not have, from which on it is another board."""
 _FEWEST_MARKERS = 4
 """Markers of one dictionary that are no accident."""
 
@@ -46,21 +48,35 @@ def _copy(gray: np.ndarray, side_px: int) -> tuple[np.ndarray, float]:
 
 def _charuco(gray: np.ndarray, target: Target) -> Corners:
     dictionary = dictionary_named(target.dictionary)
+    if not hasattr(cv2.aruco, 'CharucoDetector'):
+        return _charuco_before_47(gray, target, dictionary)
     size = (target.columns, target.rows)
-    if hasattr(cv2.aruco, 'CharucoDetector'):
-        board = cv2.aruco.CharucoBoard(size, target.dx_mm, target.marker_mm, dictionary)
-        if hasattr(board, 'setLegacyPattern'):  # from OpenCV 4.8 on
-            board.setLegacyPattern(target.legacy)
-        corners, ids, _, _ = cv2.aruco.CharucoDetector(board).detectBoard(gray)
-    else:  # before OpenCV 4.7, whose boards all have the old layout
-        board = cv2.aruco.CharucoBoard_create(*size, target.dx_mm, target.marker_mm, dictionary)
-        markers, marker_ids, _ = cv2.aruco.detectMarkers(gray, dictionary)
-        corners, ids = None, None
-        if markers:
-            _, corners, ids = cv2.aruco.interpolateCornersCharuco(markers, marker_ids, gray, board)
+    board = cv2.aruco.CharucoBoard(size, target.dx_mm, target.marker_mm, dictionary)
+    if hasattr(board, 'setLegacyPattern'):  # from OpenCV 4.8 on
+        board.setLegacyPattern(target.legacy)
+    corners, ids, _, _ = cv2.aruco.CharucoDetector(board).detectBoard(gray)
+    return _NONE if ids is None else (corners.reshape(-1, 2).astype(float), ids.ravel())
+
+
+def _charuco_before_47(gray: np.ndarray, target: Target, dictionary) -> Corners:
+    """Do what OpenCV's CharucoDetector does from 4.7 on."""
+    # The legacy layout of even rows is today's with one row more above.
+    above = int(target.legacy and target.rows % 2 == 0)
+    columns, rows = target.columns, target.rows + above
+    board = cv2.aruco.CharucoBoard_create(
+        columns, rows, target.dx_mm, target.marker_mm, dictionary
+    )
+    markers, ids, _ = cv2.aruco.detectMarkers(gray, dictionary)
     if ids is None:
         return _NONE
-    return corners.reshape(-1, 2).astype(float), ids.ravel()
+    ids = ids + np.int32(above * (columns // 2))
+    if np.mean(ids >= rows * columns // 2) > _MOST_FOREIGN:
+        return _NONE
+    _, corners, ids = cv2.aruco.interpolateCornersCharuco(markers, ids, gray, board)
+    if ids is None:
+        return _NONE
+    ids = ids.ravel() - above * (columns - 1)
+    return corners.reshape(-1, 2)[ids >= 0].astype(float), ids[ids >= 0]
 
 
 def find_aprilgrid(gray: np.ndarray, target: Target) -> Corners:

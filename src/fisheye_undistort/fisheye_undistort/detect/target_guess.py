@@ -115,7 +115,7 @@ def _what_is_there(picture: NamedPicture, detector: Detector) -> tuple[Target | 
         and target.kind == 'chessboard'
         and sorted(size) != sorted((target.rows, target.columns))
     ):
-        return None, f'a chessboard of {size[0]} x {size[1]} inner corners'
+        return None, f'{size[0]} x {size[1]} inner corners of a chessboard'
     for kind, other in STANDARD.items():
         if kind != target.kind and _shows([picture], replace(detector, target=other)):
             return None, f'the target {other}'
@@ -125,7 +125,7 @@ def _what_is_there(picture: NamedPicture, detector: Detector) -> tuple[Target | 
             return other, ''
         return None, f'markers of {name}'
     if size and target.kind != 'charuco':
-        return None, f'a chessboard of {size[0]} x {size[1]} inner corners'
+        return None, f'{size[0]} x {size[1]} inner corners of a chessboard'
     return None
 
 
