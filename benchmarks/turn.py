@@ -21,7 +21,8 @@ from fisheye_geometry.attitude import Attitude, angle_between
 from fisheye_geometry.lens import FisheyeLens
 from panorama_stitch.turn.tracker import TurnTracker
 from panorama_stitch.turn.turn_calibration import calibrate_turn
-from panorama_stitch.turn.turn_report import SIGMAS, TurnReport
+from panorama_stitch.turn.turn_certainty import SIGMAS
+from panorama_stitch.turn.turn_report import TurnReport
 
 FOCAL_PERCENT, ANGLE_DEG, ROTATION_DEG, VERTICAL_DEG = 0.5, 0.3, 0.3, 0.3
 """The targets."""

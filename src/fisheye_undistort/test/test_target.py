@@ -82,7 +82,7 @@ def test_impossible_targets_are_refused_by_name(arguments, told):
 
 
 def test_an_opencv_without_markers_is_said_where_they_are_needed(monkeypatch):
-    monkeypatch.delattr(cv2, 'aruco')
+    monkeypatch.delattr(cv2, 'aruco', raising=False)
     assert replace(STANDARD['charuco'], rows=4).rows == 4
     with pytest.raises(SettingError, match='the target has markers, and OpenCV'):
         dictionary_named(MARKERS)

@@ -67,7 +67,13 @@ class LevelViews:
         return np.where(weight > 0, detail, 0)
 
     def find(
-        self, seen: Sightings, reference: Sightings, reach_px: int, least: float
+        self,
+        seen: Sightings,
+        reference: Sightings,
+        reach_px: int,
+        least: float,
+        *,
+        sheared: bool,
     ) -> Sightings:
         """Look for landmarks where they should be.
 
@@ -81,6 +87,8 @@ class LevelViews:
             How far from where it should be, px of the level pictures.
         least
             Correlation from which on it is found.
+        sheared
+            Whether it may look sheared and stretched.
 
         Returns
         -------
@@ -95,7 +103,7 @@ class LevelViews:
             camera, frame = reference.camera[landmark], reference.frame[landmark]
             patch = zoomed(self._pictures[camera][frame], looks_like[landmark], zoom[i])
             picture = self._pictures[seen.camera[i]][seen.frame[i]]
-            there = find_patch(picture, place[i], patch, reach_px, least)
+            there = find_patch(picture, place[i], patch, reach_px, least, sheared=sheared)
             if there is not None:
                 keep[i], found[i] = True, there
         return self._seen_at(seen.only(keep), found[keep])

@@ -22,7 +22,13 @@ def zoomed(picture: np.ndarray, where: np.ndarray, zoom: float) -> np.ndarray:
 
 
 def find_patch(
-    picture: np.ndarray, where: np.ndarray, patch: np.ndarray, reach_px: int, least: float
+    picture: np.ndarray,
+    where: np.ndarray,
+    patch: np.ndarray,
+    reach_px: int,
+    least: float,
+    *,
+    sheared: bool,
 ) -> np.ndarray | None:
     """Find a patch near a place of a picture.
 
@@ -38,6 +44,8 @@ def find_patch(
         How far from there it may be.
     least
         Correlation from which on it is found.
+    sheared
+        Whether it may be sheared and stretched.
 
     Returns
     -------
@@ -48,7 +56,7 @@ def find_patch(
     if window is None or patch.std() < _LEAST_CONTRAST:
         return None
     shift = _peak(cv2.matchTemplate(window, patch, cv2.TM_CCOEFF_NORMED), least)
-    if shift is not None:
+    if shift is not None and sheared:
         shift = _warped(window, patch, shift)
     return None if shift is None else np.round(where) + shift - reach_px
 

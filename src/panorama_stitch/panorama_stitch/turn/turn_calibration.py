@@ -22,9 +22,9 @@ from panorama_stitch.turn.turn_state import TurnState
 _LEAST_CORNERS = 25
 _SHARES = 1.0, 0.85
 """Of the first focal lengths, from which the fit begins: one begin may end in a wrong valley."""
-_LOOKS = ((14, 0.8, 0.33), (6, 0.8, 0.5), (4, 0.85, 0.5))
-"""How far each look at all pictures reaches, px; which correlation it asks for; and what share of
-the landmarks each picture is asked for."""
+_LOOKS = ((14, 0.8, 0.33, False), (6, 0.8, 0.5, True), (4, 0.85, 0.5, True))
+"""How far each look at all pictures reaches, px; which correlation it asks for; what share of the
+landmarks each picture is asked for; and whether they may look sheared and stretched."""
 
 
 @dataclass(frozen=True)
@@ -83,12 +83,12 @@ def calibrate_turn(
     fits = [adjust(state, seen, sizes, yaws_known=False) for state, seen in starts]
     fit = min(fits, key=lambda fit: fit.noise_px / len(fit.seen))
     state, seen, found_share = _with_yaws(fit.state, frames, brightest), fit.seen, 0.0
-    for reach_px, least, share in _LOOKS:
+    for reach_px, least, share, sheared in _LOOKS:
         reference = clearest(state, seen)
         views = LevelViews(frames, state, brightest)
         wanted = everywhere(state, share)
         wanted = wanted.only(views.visible(wanted))
-        found = views.find(wanted, reference, reach_px, least)
+        found = views.find(wanted, reference, reach_px, least, sheared=sheared)
         found_share = len(found) / max(len(wanted), 1)
         fit = adjust(state, found, sizes, yaws_known=True, noise_px=fit.noise_px)
         state, seen = fit.state, fit.seen
