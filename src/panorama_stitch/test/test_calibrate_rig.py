@@ -148,6 +148,13 @@ def test_cameras_with_different_numbers_of_pictures(recorded, tmp_path, capsys):
     assert 'left has 1 pictures and right more' in told
 
 
+def test_a_picture_that_cannot_be_read(recorded, tmp_path, capsys):
+    shutil.copy(recorded / 'left' / '000.png', tmp_path)
+    (tmp_path / '001.png').write_bytes(b'no picture')
+    told = refused(capsys, f'left={tmp_path}')
+    assert '001.png is not a picture that can be read' in told
+
+
 def test_a_scene_that_stands_still(recorded, tmp_path, capsys):
     for name in NAMES:
         (tmp_path / name).mkdir()

@@ -42,4 +42,8 @@ def read_recording(sources: Mapping[str, str]) -> Iterator[tuple[np.ndarray, ...
                 'each camera, taken at the same times'
             )
         number += 1
-        yield tuple(each.gray for each in pictures.values() if isinstance(each, NamedPicture))
+        read = [each for each in pictures.values() if isinstance(each, NamedPicture)]
+        for each in read:
+            if each.problem:
+                raise SourceError(each.problem)
+        yield tuple(each.gray for each in read)
