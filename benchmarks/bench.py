@@ -82,7 +82,7 @@ def print_nodes_header() -> None:
     published = ', '.join(f'{hz} on a {what}' for what, hz in PAPER_HZ.items())
     print(f'\nPublished system: {published} panoramas a second.')
     print(
-        'nodes                             Hz   p50   p95   p99 ms  lost missing '
+        'nodes                             Hz   p50   p95   p99 ms (calibrating)  lost missing '
         ' CPU ms   MiB  first s  calibration s  views Hz, p99 ms'
     )
 
@@ -90,11 +90,12 @@ def print_nodes_header() -> None:
 def print_run(run: Run) -> None:
     """Print one row."""
     missing = '-' if run.missing is None else run.missing
+    calibrating = '-' if run.calibrating_p99_ms is None else f'{run.calibrating_p99_ms:.1f}'
     views = '-' if run.view_hz is None else f'{run.view_hz:.1f}, {run.view_p99_ms:.1f}'
     print(
         f'{run.name:30s} {run.rate_hz:5.1f} {run.p50_ms:5.1f} {run.p95_ms:5.1f} {run.p99_ms:5.1f} '
-        f'{run.lost:8d} {missing!s:>7s} {run.cpu_ms:7.1f} {run.memory_mib:5.0f} '
-        f'{run.first_s:8.1f} {run.calibration_s:14.1f}  {views}',
+        f'{calibrating:>16s} {run.lost:5d} {missing!s:>7s} {run.cpu_ms:7.1f} '
+        f'{run.memory_mib:5.0f} {run.first_s:8.1f} {run.calibration_s:14.1f}  {views}',
         flush=True,
     )
 

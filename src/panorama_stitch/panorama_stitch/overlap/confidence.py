@@ -41,14 +41,18 @@ class Evidence:
         The same of the whole overlap.
     support
         Weight of the matched features that proposed it.
-    rivalled
+    others
         Weight of those that proposed the best other rotation.
+    rivalled
+        Merit of the best other rotation that was tried, as a share of that of this one.
     near_share
         Share of those that nearness explains.
     lead
         By how much any other depth fits worse.
     halves_rad
         How far the scene lies elsewhere if only one half of the overlap, by height, decides.
+    sides_rad
+        The same of the halves towards either camera.
     accounted
         Share of what shows anything that agrees or is near, in that half where it is less.
     significance
@@ -64,10 +68,12 @@ class Evidence:
     explained: float
     coverage: float
     support: float
+    others: float
     rivalled: float
     near_share: float
     lead: float
     halves_rad: float
+    sides_rad: float
     accounted: float
     significance: float
     deviation_rad: float
@@ -83,7 +89,7 @@ class Evidence:
                 self.share,
                 self.explained,
                 np.log(self.support + 0.1),
-                np.log(self.rivalled + 0.1),
+                np.log(self.others + 0.1),
                 -np.log(self.deviation_rad),
                 np.log(1.0001 - self.peak),
                 np.log(self.halves_rad + _LEAST_APART_RAD),

@@ -12,7 +12,7 @@ import numpy as np
 
 from panorama_stitch.overlap.view import OverlapView
 
-_DENSITY = 260.0
+_DENSITY = 170.0
 """Pixels per radian at the edge of the view; finer pictures tell no more."""
 _WIDEST_RAD = np.radians(125)
 _MOST = 900

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from panorama_stitch.overlap.choice import choose
+from panorama_stitch.overlap.choice import choose, is_clear
 from panorama_stitch.overlap.coarse import coarse_rotations
 from panorama_stitch.overlap.confidence import Evidence, confidence
 from panorama_stitch.overlap.correspondences import (
@@ -24,7 +24,7 @@ from panorama_stitch.overlap.features import find_features
 from panorama_stitch.overlap.parallax import halves_apart
 from panorama_stitch.overlap.result import RotationResult
 from panorama_stitch.overlap.rotation import Proposal, added, propose_rotations
-from panorama_stitch.overlap.trial import SHARP, try_rotation
+from panorama_stitch.overlap.trial import SHARP, Trial, try_rotation
 from panorama_stitch.overlap.view import OverlapView
 
 MIN_CONFIDENCE = 0.7
@@ -63,44 +63,50 @@ def measure_rotation(
         With less the rotation is not believed.
     """
     usable = [_usable(*pair) for pair in pairs]
-    few = range(0, len(pairs), -(-len(pairs) // _PROPOSING))
-    matches = join([_matches(pairs[i], usable[i]) for i in few])
     near = None if expected is None else expected.as_matrix()
-    proposals = propose_rotations(matches, _PROPOSALS, near=near, within_rad=within_rad)
+    known = {'near': near, 'within_rad': within_rad}
+    seen: dict[int, Correspondences] = {}
+    proposals: list[Proposal] = []
+    for i in range(0, len(pairs), -(-len(pairs) // _PROPOSING)):
+        seen[i] = _matches(pairs[i], usable[i])
+        matches = join(list(seen.values()))
+        proposals = propose_rotations(matches, _PROPOSALS, **known)
+        if is_clear(proposals):
+            break
+    first = max(seen, key=lambda i: len(seen[i]))
     if near is not None:
         proposals.append(Proposal(near, 0.0))
 
     def more():
-        coarse = coarse_rotations(*pairs[0], usable[0])
-        known = {'near': near, 'within_rad': within_rad}
+        coarse = coarse_rotations(*pairs[first], usable[first])
         return added(proposals, coarse, _COARSE_PROPOSALS, matches, **known)
 
-    best = choose(pairs, usable, few, proposals, more)
+    best = choose(pairs, usable, first, proposals, more)
     if best is None:
         return RotationResult(None)
     chosen, stages, wide, close = best.proposal, best.stages, best.wide, best.close
-    fine = close
-    for reach in dict.fromkeys((stages.fine, SHARP.fine)):
-        trial = try_rotation(pairs, usable, close.rotation, reach)
-        if trial and (fine is close or trial.far > fine.far):
-            fine = trial
+    reaches = dict.fromkeys((stages.fine, SHARP.fine))
+    fits = [try_rotation(pairs, usable, close.rotation, reach) for reach in reaches]
+    fine = min([close, *filter(None, fits)], key=_variance)
     rotation = Rotation.from_matrix(fine.rotation)
     if expected is not None and (expected.inv() * rotation).magnitude() > within_rad:
         return RotationResult(None)
-    rivalled = max((one.support for one in proposals if one is not chosen), default=0.0)
+    others = max((one.support for one in proposals if one is not chosen), default=0.0)
     covariance = _REDUNDANT * fine.fit.covariance + np.eye(3) * _LENS_RAD**2
     evidence = Evidence(
         far=fine.far / len(pairs),
         share=fine.share,
         explained=fine.explained,
         coverage=fine.far / max(fine.votes.area, 1e-9),
-        support=chosen.support / len(few),
-        rivalled=rivalled / len(few),
+        support=chosen.support / len(seen),
+        others=others / len(seen),
+        rivalled=best.rivalled,
         near_share=float(close.votes.weight[close.fit.near].sum() / close.votes.weight.sum()),
         lead=min(wide.fit.lead, close.fit.lead),
-        halves_rad=float(halves_apart(fine.votes, fine.fit)),
+        halves_rad=float(halves_apart(fine.votes, fine.fit, fine.votes.height)),
+        sides_rad=float(halves_apart(fine.votes, fine.fit, fine.votes.right[:, 0])),
         accounted=float(close.accounted),
-        significance=float(wide.significance) / len(few) ** 0.5,
+        significance=float(wide.significance),
         deviation_rad=float(np.sqrt(np.linalg.eigvalsh(covariance)[-1])),
         peak=float(np.mean(fine.votes.peak[fine.fit.far])) if fine.fit.far.any() else 0.0,
     )
@@ -141,6 +147,10 @@ def _alike(left, right):
 def _matches(pair, usable) -> Correspondences:
     left, right = (find_features(view, seen) for view, seen in zip(pair, usable, strict=True))
     return match_features(left, right, static=_alike(*pair))
+
+
+def _variance(trial: Trial) -> float:
+    return float(np.linalg.eigvalsh(trial.fit.covariance)[-1])
 
 
 def _near_deg(trial) -> float:

@@ -29,6 +29,8 @@ _SCAN_RAD = tuple(
 """Pitch, yaw and roll of the seam that are tried."""
 _SCANNED = 150
 """So many votes are enough to tell which of these are worth trying."""
+_PARTS = 16
+"""So that what is computed of one part stays in the processor's cache."""
 _STARTS = 4
 _OTHER_RAD = np.radians(1.0)
 _HALF_MISSING_RAD = np.radians(5.0)
@@ -109,7 +111,8 @@ def fit_far(votes: Votes, *, scan: bool) -> Fit | None:
     starts = np.zeros((1, 3))
     if scan:
         grid = np.stack(np.meshgrid(*_SCAN_RAD, indexing='ij'), -1).reshape(-1, 3)
-        cost = _Problem(thinned(votes, _SCANNED)).cost(grid)
+        few = _Problem(thinned(votes, _SCANNED))
+        cost = np.concatenate([few.cost(part) for part in np.array_split(grid, _PARTS)])
         starts = []
         while len(starts) < _STARTS and np.isfinite(cost).any():
             starts.append(grid[np.argmin(cost)])
@@ -120,16 +123,16 @@ def fit_far(votes: Votes, *, scan: bool) -> Fit | None:
     return replace(best, lead=min(others, default=_OUTLIER) - best.cost)
 
 
-def halves_apart(votes: Votes, fit: Fit) -> float:
-    """How far the votes lie elsewhere if only their upper, or only their lower, half decides, rad.
+def halves_apart(votes: Votes, fit: Fit, place: np.ndarray) -> float:
+    """How far the votes lie elsewhere if only one half of them by `place` (n,) decides, rad.
 
     What is near fills a part of the overlap: where it alone made the fit, the rest disagrees.
     """
     counted = fit.far | fit.near
     if not counted.any():
         return _HALF_MISSING_RAD
-    upper = votes.height < np.median(votes.height[counted])
-    fits = [fit_far(chosen(votes, half), scan=False) for half in (upper, ~upper)]
+    first = place < np.median(place[counted])
+    fits = [fit_far(chosen(votes, half), scan=False) for half in (first, ~first)]
     turn_along = _Problem(votes).turn_along
     return max(
         np.sqrt(np.average((turn_along @ (half.step - fit.step)) ** 2, weights=votes.weight))

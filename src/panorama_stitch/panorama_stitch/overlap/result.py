@@ -18,7 +18,7 @@ LIMITS = {
 """What limits a measurement, and what that means."""
 _LITTLE, _SMALL_PART = 30.0, 0.15
 _MOSTLY = 0.5
-_SLIGHT_LEAD = 0.3
+_SLIGHT_LEAD, _NEARLY = 0.3, 0.7
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class RotationResult:
             return 'near' if self.found else 'apart'
         if evidence.lead < _SLIGHT_LEAD:
             return 'depths'
-        if evidence.rivalled > evidence.support:
+        if evidence.rivalled > _NEARLY:
             return 'repeating'
         if evidence.far < _LITTLE or evidence.coverage < _SMALL_PART:
             return 'few'

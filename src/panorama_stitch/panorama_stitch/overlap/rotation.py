@@ -147,8 +147,8 @@ def _allowed(rotations, near, within_rad):
 
 
 def _misses(rotations, left, right):
-    turned = np.einsum('hij,nj->hni', rotations, right, optimize=True)
-    return np.sqrt(np.maximum(2 - 2 * np.einsum('hni,ni->hn', turned, left, optimize=True), 0))
+    products = (left[:, :, None] * right[:, None]).reshape(-1, 9)
+    return np.sqrt(np.maximum(2 - 2 * rotations.reshape(-1, 9) @ products.T, 0))
 
 
 def _spread(rays):

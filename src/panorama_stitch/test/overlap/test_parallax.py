@@ -74,10 +74,11 @@ def test_too_few_votes_give_no_answer():
 def test_halves_disagree_where_one_of_them_is_near():
     far = votes(np.zeros(3), np.zeros(300))
     fit = fit_far(far, scan=False)
-    assert np.degrees(halves_apart(far, fit)) < SHARP_DEG
+    assert np.degrees(halves_apart(far, fit, far.height)) < SHARP_DEG
     # So little that it passes for far, and draws the whole fit with it.
     floor = votes(np.zeros(3), np.where(far.right[:, 1] > 0, 0.4, 0.0))
-    assert np.degrees(halves_apart(floor, fit_far(floor, scan=False))) > 2 * SHARP_DEG
+    fit = fit_far(floor, scan=False)
+    assert np.degrees(halves_apart(floor, fit, floor.height)) > 2 * SHARP_DEG
 
 
 def test_a_half_in_which_nothing_agrees_is_told():
