@@ -15,7 +15,7 @@ from panorama_stitch.overlap.confidence import RIGHT_RAD, Evidence
 from panorama_stitch.overlap.measure import measure_rotation
 from panorama_stitch.overlap.view import OverlapView
 
-FIRST_SEED = 1000
+FIRST_SEED = 50000
 RIDGE = 1.0
 """Weight of a tie to 0, in cases: what the rigs do not tell stays out."""
 
@@ -23,8 +23,8 @@ RIDGE = 1.0
 def main() -> int:
     """Print the weights."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument('--rigs', type=int, default=360, help='with a common scene')
-    parser.add_argument('--apart', type=int, default=160, help='without')
+    parser.add_argument('--rigs', type=int, default=600, help='with a common scene')
+    parser.add_argument('--apart', type=int, default=60, help='without')
     options = parser.parse_args()
     cv2.setNumThreads(1)
     evidence, right = [], []

@@ -38,7 +38,7 @@ class Candidate:
 def choose(
     pairs: Sequence[tuple[OverlapView, OverlapView]],
     usable,
-    first: int,
+    few: Sequence[int],
     proposals: Sequence[Proposal],
     more: Callable[[], list[Proposal]],
 ) -> Candidate | None:
@@ -48,12 +48,12 @@ def choose(
     ----------
     pairs, usable
         As of `try_rotation`.
-    first
-        Which of the pairs is enough for a first look.
+    few
+        Which of the pairs are enough for a first look.
     proposals, more
         What to try, and what else where none of these is clear.
     """
-    look = [pairs[first]], [usable[first]]
+    look = [pairs[i] for i in few], [usable[i] for i in few]
     best, most = None, 0.0
     untried = proposals
     for stages in (SHARP, DIM):

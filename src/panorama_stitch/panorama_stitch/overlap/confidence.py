@@ -9,19 +9,9 @@ RIGHT_RAD = np.radians(0.5)
 """What `right` means."""
 _LEAST_APART_RAD = np.radians(0.05)
 """Halves that are nearer to one another agree."""
-_WEIGHTS = (
-    -13.062,
-    -0.922,
-    5.386,
-    2.513,
-    0.299,
-    0.688,
-    1.588,
-    0.470,
-    -0.797,
-    0.878,
-    0.647,
-)
+_LEAST_ACCOUNTED, _ENOUGH_ACCOUNTED = 0.02, 0.3
+"""A half of which more is accounted for tells no more by it."""
+_WEIGHTS = (-12.583, -0.069, 4.816, 2.64, 0.573, 0.631, 0.53, -1.725, -0.534, 0.956)
 """Of `Evidence.features`, as benchmarks/fit_confidence.py prints them."""
 
 
@@ -41,8 +31,6 @@ class Evidence:
         The same of the whole overlap.
     support
         Weight of the matched features that proposed it.
-    others
-        Weight of those that proposed the best other rotation.
     rivalled
         Merit of the best other rotation that was tried, as a share of that of this one.
     near_share
@@ -50,9 +38,8 @@ class Evidence:
     lead
         By how much any other depth fits worse.
     halves_rad
-        How far the scene lies elsewhere if only one half of the overlap, by height, decides.
-    sides_rad
-        The same of the halves towards either camera.
+        How far the scene lies elsewhere if only one half of the overlap decides: the upper or the
+        lower one, or that towards either camera.
     accounted
         Share of what shows anything that agrees or is near, in that half where it is less.
     significance
@@ -68,12 +55,10 @@ class Evidence:
     explained: float
     coverage: float
     support: float
-    others: float
     rivalled: float
     near_share: float
     lead: float
     halves_rad: float
-    sides_rad: float
     accounted: float
     significance: float
     deviation_rad: float
@@ -81,7 +66,7 @@ class Evidence:
 
     @property
     def features(self) -> np.ndarray:
-        """(11,) what the logistic regression works on."""
+        """(10,) what the logistic regression works on."""
         return np.array(
             [
                 1.0,
@@ -89,12 +74,11 @@ class Evidence:
                 self.share,
                 self.explained,
                 np.log(self.support + 0.1),
-                np.log(self.others + 0.1),
-                -np.log(self.deviation_rad),
+                np.log(max(self.significance, 0.0) + 0.3),
                 np.log(1.0001 - self.peak),
                 np.log(self.halves_rad + _LEAST_APART_RAD),
-                np.log(max(self.accounted, 0.01)),
-                np.log(max(self.significance, 0.0) + 0.3),
+                np.log(self.rivalled + 0.05),
+                np.log(np.clip(self.accounted, _LEAST_ACCOUNTED, _ENOUGH_ACCOUNTED)),
             ]
         )
 

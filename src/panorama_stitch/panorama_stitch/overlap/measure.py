@@ -30,8 +30,8 @@ from panorama_stitch.overlap.view import OverlapView
 MIN_CONFIDENCE = 0.7
 """Below it two views count as having no common scene."""
 _PROPOSALS, _COARSE_PROPOSALS = 8, 5
-_PROPOSING = 3
-"""Pairs of images in which features are looked for."""
+_AGREEING, _PROPOSING = 2, 3
+"""Pairs of images in which features are looked for: enough if they agree, and at most."""
 _SURELY_NEAR = 0.15
 """Share of the votes below which what seems near is a few wrong ones."""
 _REDUNDANT = 4.0
@@ -71,17 +71,16 @@ def measure_rotation(
         seen[i] = _matches(pairs[i], usable[i])
         matches = join(list(seen.values()))
         proposals = propose_rotations(matches, _PROPOSALS, **known)
-        if is_clear(proposals):
+        if len(seen) >= _AGREEING and is_clear(proposals):
             break
-    first = max(seen, key=lambda i: len(seen[i]))
     if near is not None:
         proposals.append(Proposal(near, 0.0))
 
     def more():
-        coarse = coarse_rotations(*pairs[first], usable[first])
+        coarse = coarse_rotations(*pairs[0], usable[0])
         return added(proposals, coarse, _COARSE_PROPOSALS, matches, **known)
 
-    best = choose(pairs, usable, first, proposals, more)
+    best = choose(pairs, usable, list(seen), proposals, more)
     if best is None:
         return RotationResult(None)
     chosen, stages, wide, close = best.proposal, best.stages, best.wide, best.close
@@ -91,22 +90,22 @@ def measure_rotation(
     rotation = Rotation.from_matrix(fine.rotation)
     if expected is not None and (expected.inv() * rotation).magnitude() > within_rad:
         return RotationResult(None)
-    others = max((one.support for one in proposals if one is not chosen), default=0.0)
     covariance = _REDUNDANT * fine.fit.covariance + np.eye(3) * _LENS_RAD**2
+    height, across = fine.votes.height, fine.votes.right[:, 0]
     evidence = Evidence(
         far=fine.far / len(pairs),
         share=fine.share,
         explained=fine.explained,
         coverage=fine.far / max(fine.votes.area, 1e-9),
         support=chosen.support / len(seen),
-        others=others / len(seen),
         rivalled=best.rivalled,
         near_share=float(close.votes.weight[close.fit.near].sum() / close.votes.weight.sum()),
         lead=min(wide.fit.lead, close.fit.lead),
-        halves_rad=float(halves_apart(fine.votes, fine.fit, fine.votes.height)),
-        sides_rad=float(halves_apart(fine.votes, fine.fit, fine.votes.right[:, 0])),
+        halves_rad=float(
+            max(halves_apart(fine.votes, fine.fit, place) for place in (height, across))
+        ),
         accounted=float(close.accounted),
-        significance=float(wide.significance),
+        significance=float(wide.significance) / len(seen) ** 0.5,
         deviation_rad=float(np.sqrt(np.linalg.eigvalsh(covariance)[-1])),
         peak=float(np.mean(fine.votes.peak[fine.fit.far])) if fine.fit.far.any() else 0.0,
     )
