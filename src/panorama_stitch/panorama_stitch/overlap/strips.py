@@ -64,8 +64,9 @@ def seam_frame(rotation: np.ndarray) -> np.ndarray:
 
 def seam_rays(u_rad: np.ndarray, v_rad: np.ndarray) -> np.ndarray:
     """Rays (..., 3) of the seam frame at angles that broadcast against each other."""
-    u, v = np.broadcast_arrays(u_rad, v_rad)
-    return np.stack([np.sin(u), np.cos(u) * np.sin(v), np.cos(u) * np.cos(v)], axis=-1)
+    side = np.cos(u_rad)
+    parts = np.broadcast_arrays(np.sin(u_rad), side * np.sin(v_rad), side * np.cos(v_rad))
+    return np.stack(parts, axis=-1)
 
 
 def draw_strips(
