@@ -4,7 +4,7 @@ import time
 from collections.abc import Iterator
 from fractions import Fraction
 from itertools import count
-from threading import Thread
+from threading import Event, Thread
 
 import av
 import cv2
@@ -14,6 +14,8 @@ from av.video.frame import PictureType
 from fisheye_testing.painted_time import paint
 
 CLOCK_HZ = 90_000
+_GONE = 5
+"""Whoever joins after so many pictures gets nothing of the first one, a keyframe."""
 
 
 def pictures(width: int, height: int, rate_hz: float) -> Iterator[np.ndarray]:
@@ -52,12 +54,19 @@ class Encoder:
             stream.options = {'huffman': 'default', 'force_duplicated_matrix': '1'}
         stream.codec_context.thread_count = 1
         self._stream, self._arguments, self._relay = stream, arguments, relay
+        self._is_running = Event()
         Thread(target=self._run, daemon=True).start()
+        if arguments.join_late:
+            self._is_running.wait()
 
     def _run(self):
         arguments = self._arguments
         start_ns = None
-        for image in pictures(arguments.width, arguments.height, arguments.rate):
+        for number, image in enumerate(
+            pictures(arguments.width, arguments.height, arguments.rate)
+        ):
+            if number == _GONE:
+                self._is_running.set()
             now_ns = time.time_ns()
             start_ns = start_ns or now_ns
             frame = av.VideoFrame.from_ndarray(image, format='bgr24')

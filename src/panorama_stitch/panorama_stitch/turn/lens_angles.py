@@ -8,6 +8,9 @@ from fisheye_geometry.lens import FisheyeLens
 from fisheye_undistort.fit.angle_map import AngleMap, lit_part
 from fisheye_undistort.report.misfit import DIRECTIONS, sector_of
 
+_COMMON_PX = 0.1
+"""By which every sighting of a landmark may be off alike: neither their scatter nor two halves of
+them show it."""
 _MIDDLE = 0.5
 """Of the angle at the edge: what is within is not near any edge."""
 
@@ -26,7 +29,7 @@ class LensAngles:
         (N,) about the axis, 0 to the right, clockwise, rad.
     deviations
         (N,) standard deviation of the ray there, rad: from the covariance, or half of what two
-        halves of the sightings disagree by where that is more.
+        halves of the sightings disagree by where that is more, and what all have in common.
     """
 
     lens: FisheyeLens
@@ -64,7 +67,7 @@ class LensAngles:
             lens,
             angles.angle_rad[seen],
             np.arctan2(y, x),
-            np.maximum(angles.deviation_rad(covariance), apart)[seen],
+            with_common(np.maximum(angles.deviation_rad(covariance), apart)[seen], lens),
         )
 
     @property
@@ -85,3 +88,8 @@ class LensAngles:
             return 'in the middle'
         direction = DIRECTIONS[sector_of(self.azimuths[worst])]
         return f'{np.degrees(self.angles[worst]):.0f} degrees off the axis {direction}'
+
+
+def with_common(deviation_rad: np.ndarray | float, lens: FisheyeLens) -> np.ndarray:
+    """Add to a deviation, rad, what sightings through a lens have in common."""
+    return np.hypot(deviation_rad, _COMMON_PX / lens.focal_x_px)

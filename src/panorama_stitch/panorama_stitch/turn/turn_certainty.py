@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from fisheye_geometry.attitude import angle_between
-from panorama_stitch.turn.lens_angles import LensAngles
+from panorama_stitch.turn.lens_angles import LensAngles, with_common
 from panorama_stitch.turn.turn_calibration import TurnCalibration
 from panorama_stitch.turn.turn_state import OF_CAMERA, WIDTH
 
@@ -61,7 +61,7 @@ class TurnCertainty:
         attitudes = [half.attitudes[camera] for half in self.calibration.halves.states]
         halves = np.linalg.norm(np.subtract(*(attitude[1] for attitude in attitudes)))
         sigma = max(float(np.hypot(told['turn_x'], told['turn_z'])), float(halves) / 2)
-        return float(np.degrees(SIGMAS * sigma))
+        return float(np.degrees(SIGMAS * with_common(sigma, self.lenses[camera].lens)))
 
     def rotation_deg(self, left: int, right: int) -> float:
         """Return by how much the rotation between two cameras is uncertain, deg."""
@@ -73,7 +73,8 @@ class TurnCertainty:
             half.attitudes[left].T @ half.attitudes[right] for half in calibration.halves.states
         )
         sigma = calibration.halves.scale * float(np.sqrt(np.trace(covariance)))
-        return float(np.degrees(SIGMAS * max(sigma, angle_between(one, other) / 2)))
+        sigma = max(sigma, float(angle_between(one, other)) / 2)
+        return float(np.degrees(SIGMAS * with_common(sigma, self.lenses[left].lens)))
 
     @cached_property
     def doubts(self) -> list[str]:
