@@ -5,7 +5,7 @@ import signal
 from pathlib import Path
 
 import pytest
-from field import START_S, write_pictures
+from field import START_S, STOP_S, write_pictures
 from fisheye_msgs.srv import CalibrateOverlap
 from sensor_msgs.msg import Image
 
@@ -16,12 +16,9 @@ from fisheye_testing.mjpeg_server import MjpegServer, jpeg
 from fisheye_testing.rig import SIDES, RigProcesses
 from fisheye_testing.waiting import wait_for
 
-LONG = bool(os.environ.get('LONG'))
-STOP_S = 2.0 if LONG else 4.0
-"""A busy machine may take twice as long; the long form wants a quiet one."""
 NOBODY = 'http://127.0.0.1:9/stream'
 ERROR = b'\x02'
-SIGNALS = (signal.SIGINT, signal.SIGTERM) if LONG else (signal.SIGTERM,)
+SIGNALS = (signal.SIGINT, signal.SIGTERM) if os.environ.get('LONG') else (signal.SIGTERM,)
 LARGE = {'width': 1920, 'height': 1440}
 """Pictures of this size keep a calibration busy for seconds."""
 
