@@ -68,4 +68,8 @@ def test_views_have_their_place_in_the_rig(rig, watcher, heard):
     assert {each['child'] for (each,) in moved} == {'front_optical_frame'}
     stamps = [each['stamp_ns'] for (each,) in moved]
     assert stamps == sorted(set(stamps))
-    assert off_deg(heard('/tf', 1)[0][0], np.degrees(0.5), 0) < EXACT_DEG
+
+    def is_there():
+        return off_deg(heard('/tf', 1)[0][0], np.degrees(0.5), 0) < EXACT_DEG
+
+    wait_for(is_there, START_S, 'the end of its turn')
