@@ -142,10 +142,13 @@ def test_one_turns_without_end_on_a_closed_panorama_only(browser, serve):
     assert np.ptp(turns_deg) < 0.1
     # The same picture, not closed, has ends.
     server.tell(projection=described(CLOSED[0]))
-    page.press(Keys.ARROW_RIGHT * 45)
-    page.until(lambda: page.bearing_deg == pytest.approx(180, abs=CLOSE_DEG), 'the right end')
-    page.press(Keys.ARROW_LEFT * 45)
-    page.until(lambda: page.bearing_deg == pytest.approx(-180, abs=CLOSE_DEG), 'the left end')
+    for key, end_deg, what in ((Keys.ARROW_RIGHT, 180, 'right'), (Keys.ARROW_LEFT, -180, 'left')):
+
+        def is_at_end(key=key, end_deg=end_deg):
+            page.press(key * 5)  # the first may come before the page knows
+            return page.bearing_deg == pytest.approx(end_deg, abs=CLOSE_DEG)
+
+        page.until(is_at_end, f'the {what} end')
 
 
 def test_the_map_of_a_closed_panorama_leads_across_its_edge(browser, serve):
