@@ -21,10 +21,10 @@ START_S = 60.0
 """For what happens some time, even where much else runs too."""
 RETURN_S = 3.0
 """Within it the panorama is whole again when what was broken is back."""
-STOP_S = 2.0 if os.environ.get('LONG') else 4.0
-"""Until a node has ended; a busy machine may take longer, the long form wants a quiet one."""
+STOP_S = 2.0
+"""Within it a node has ended."""
 MAY_LOSE = 0.0 if os.environ.get('LONG') else 0.03
-"""Share of the pairs that a busy machine may lose; likewise."""
+"""Share of the pairs that a busy machine may lose; the long form wants a quiet one."""
 UNNOTICED_S = 1.5
 """No fault of one side costs more: `stale_after_s` until it counts as lost, and hiccups."""
 

@@ -27,7 +27,7 @@ OLD_MS = 1000.0
 SCHEDULING = 0.2
 """Share of the frames that a busy machine may not even take."""
 MAY_TAKE_S = RETURN_S if LONG else 2 * RETURN_S
-"""Until pictures come over a link that changed, on a busy machine and on a quiet one."""
+"""Until pictures come over a link that changed, on a quiet machine and on a busy one."""
 BASES = {'five nodes': ('left/undistort', 'right/undistort', 'stitch'), 'two': ('panorama',)}
 
 

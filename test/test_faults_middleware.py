@@ -22,10 +22,9 @@ TOOLS = Path(__file__).parents[1] / 'tools'
 RATE_HZ = 30.0
 LONG = bool(os.environ.get('LONG'))
 ROUNDS = 5 if LONG else 2
-STOPS, HELD_UP = (50, 2) if LONG else (3, 3)
+STOPS, HELD_UP = (50, 2) if LONG else (3, 1)
 """How often a subscriber is stopped, and how often that may be noticed: where it holds the lock of
-its port just then, Fast DDS waits for it up to a second, which no setting changes. A busy machine
-alone makes gaps that long: the short form only asks how long they are."""
+its port just then, Fast DDS waits for it up to a second, which no setting changes."""
 STOPPED_S, NOTICED_S, LOCKED_S = 1.0, 0.3, 2.5
 LIVELY = 0.8
 """Share of the rate that a busy machine keeps."""
@@ -151,20 +150,28 @@ def test_a_starved_subscriber_starves_nobody_else(five, how):
 
 def test_who_is_stopped_in_a_transfer_holds_up_nobody_else(five):
     subscribe(five, 'stopped')
-    gaps_s = []
-    for _ in range(STOPS):
-        begin_s = time.monotonic()
-        five.processes['stopped'].send_signal(signal.SIGSTOP)
-        try:
-            wait_for(lambda s=begin_s: time.monotonic() > s + STOPPED_S, what='the end of a stop')
-        finally:
-            five.processes['stopped'].send_signal(signal.SIGCONT)
-        arrivals_s = [entry.arrived_s for entry in five.health.seen]
-        recent_s = [arrived_s for arrived_s in arrivals_s if arrived_s > begin_s - NOTICED_S]
-        gaps_s.append(max(np.diff([*(recent_s or arrivals_s[-1:]), time.monotonic()])))
-    print(f'\n{STOPS} stops: longest gaps {np.round(sorted(gaps_s)[-3:], 2)} s')
-    assert sum(gap > NOTICED_S for gap in gaps_s) <= HELD_UP
-    assert max(gaps_s) < LOCKED_S
+
+    def hardly_noticed():
+        gaps_s = [gap_at_a_stop_s(five) for _ in range(STOPS)]
+        print(f'\n{STOPS} stops: longest gaps {np.round(sorted(gaps_s)[-3:], 2)} s')
+        assert max(gaps_s) < LOCKED_S
+        return sum(gap > NOTICED_S for gap in gaps_s) <= HELD_UP
+
+    # Other work on the machine makes gaps that long, too, and ends some time.
+    wait_for(hardly_noticed, 0 if LONG else START_S, 'stops that are hardly noticed')
+
+
+def gap_at_a_stop_s(five):
+    """Stop the subscriber for a while; return how long no panorama came to another one, s."""
+    begin_s = time.monotonic()
+    five.processes['stopped'].send_signal(signal.SIGSTOP)
+    try:
+        wait_for(lambda: time.monotonic() > begin_s + STOPPED_S, what='the end of a stop')
+    finally:
+        five.processes['stopped'].send_signal(signal.SIGCONT)
+    arrivals_s = [entry.arrived_s for entry in five.health.seen]
+    recent_s = [arrived_s for arrived_s in arrivals_s if arrived_s > begin_s - NOTICED_S]
+    return max(np.diff([*(recent_s or arrivals_s[-1:]), time.monotonic()]))
 
 
 def test_two_systems_in_two_domains_do_not_meet(rig, watcher, domain, tmp_path):
