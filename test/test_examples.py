@@ -71,13 +71,22 @@ def test_pictures_of_two_places_are_refused(rig, real_rig, tmp_path):
     assert not output.exists()
 
 
+def wait_until_measured(rig, watcher):
+    """Wait for the panorama that stays: until then two pictures stand side by side."""
+    wait_for(
+        lambda: rig.check_alive() or (watcher.is_measured and watcher.projection),
+        START_S,
+        'a measured panorama',
+    )
+
+
 @pytest.mark.parametrize('bearing_deg', [-100.0, 30.0])
 def test_a_bearing_is_marked_where_the_projection_says(rig, watcher, bearing_deg):
     rig.start('panorama')
     program = str(EXAMPLES / 'mark_bearing.py')
     words = ['--ros-args', '-p', f'bearing_deg:={bearing_deg}']
     rig.run('example', [sys.executable, program, *words])
-    wait_for(lambda: rig.check_alive() or watcher.projection, START_S, 'a projection')
+    wait_until_measured(rig, watcher)
     marked = watcher.picture_on('panorama/marked', START_S)
     projection = watcher.projection
     x_px = round(projection.center_x_px + projection.focal_px * radians(bearing_deg))
@@ -89,7 +98,7 @@ def test_a_bearing_is_marked_where_the_projection_says(rig, watcher, bearing_deg
 
 def test_a_client_of_the_video_gets_the_panorama(rig, watcher, tmp_path):
     rig.start('panorama')
-    wait_for(lambda: rig.check_alive() or watcher.projection, START_S, 'a projection')
+    wait_until_measured(rig, watcher)
     picture = tmp_path / 'picture.png'
     rig.run('example', [sys.executable, str(EXAMPLES / 'take_video.py'), str(picture)])
     code = rig.processes['example'].wait(START_S)
