@@ -151,6 +151,9 @@ def test_who_draws_more_often_than_pictures_come_gets_no_more_of_them(serve):
             await state(stream, lambda _: True)
             for _ in range(20):
                 await stream.send_str('drawn')
+            # Is answered with the state: what was sent before it has been heard then.
+            await stream.send_str('jpeg')
+            await state(stream, lambda _: True)
             server.show(b'first')
             assert await picture(stream) == b'first'
             server.show(b'overtaken')
