@@ -2,6 +2,7 @@
 
 import os
 import signal
+from functools import wraps
 from pathlib import Path
 
 import pytest
@@ -19,8 +20,29 @@ from fisheye_testing.waiting import wait_for
 NOBODY = 'http://127.0.0.1:9/stream'
 ERROR = b'\x02'
 SIGNALS = (signal.SIGINT, signal.SIGTERM) if os.environ.get('LONG') else (signal.SIGTERM,)
+TRIES = 1 if os.environ.get('LONG') else 3
+"""How often a machine that has other work to do is asked to end nodes in time."""
 LARGE = {'width': 1920, 'height': 1440}
 """Pictures of this size keep a calibration busy for seconds."""
+
+
+class TooSlowError(AssertionError):
+    """Nodes ended, but not in time."""
+
+
+def asked_again(test):
+    """Let a test that ends a `crowd` too slowly do so again, from its start."""
+
+    @wraps(test)
+    def ask(crowd, **given):
+        for _ in range(TRIES - 1):
+            try:
+                return test(crowd, **given)
+            except TooSlowError:
+                crowd.taken.clear()
+        return test(crowd, **given)
+
+    return ask
 
 
 class Crowd(RigProcesses):
@@ -68,10 +90,12 @@ def stop_all(crowd, nodes, with_signal):
         assert 'Traceback' not in words
         assert not [pid for pid in pids if Path(f'/proc/{pid}').exists()], f'{node} left children'
     print(f'\n{with_signal.name}:', ', '.join(f'{n} {s:.1f} s' for n, s in took.items()))
-    assert max(took.values()) < STOP_S, took
+    if max(took.values()) >= STOP_S:
+        raise TooSlowError(took)
 
 
 @pytest.mark.parametrize('with_signal', SIGNALS)
+@asked_again
 def test_a_node_that_waits_ends_at_once(crowd, tmp_path, with_signal):
     write_pictures(tmp_path)
     silent = MjpegServer(jpeg(90, 640, 480))
@@ -102,6 +126,7 @@ def test_a_node_that_waits_ends_at_once(crowd, tmp_path, with_signal):
 
 
 @pytest.mark.parametrize('with_signal', SIGNALS)
+@asked_again
 def test_a_node_at_work_ends_at_once(crowd, with_signal):
     nodes = ['left/capture', 'right/capture', 'left/undistort', 'right/undistort', 'stitch']
     for node in nodes:
@@ -115,6 +140,7 @@ def test_a_node_at_work_ends_at_once(crowd, with_signal):
 
 
 @pytest.mark.parametrize('with_signal', SIGNALS)
+@asked_again
 def test_a_node_that_calibrates_ends_at_once(crowd, with_signal):
     crowd.start('panorama', **LARGE)
     crowd.listen('panorama/image')
@@ -131,6 +157,7 @@ def test_a_node_that_calibrates_ends_at_once(crowd, with_signal):
 
 
 @pytest.mark.parametrize('with_signal', SIGNALS)
+@asked_again
 def test_a_node_that_is_being_built_ends_at_once(crowd, with_signal):
     crowd.start('panorama', **LARGE)
     names = crowd.health.node.get_node_names
