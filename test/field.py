@@ -38,6 +38,16 @@ def write_pictures(folder: Path) -> None:
         write_camera(folder / f'{side}.yaml', Camera(side, lens))
 
 
+def calibrated(watcher, **request):
+    """Return the answer to `calibrate_overlap`; a busy machine is asked again until it is done."""
+
+    def answered():
+        answer = watcher.calibrate(**request)
+        return answer if answer.success else None
+
+    return wait_for(answered, START_S, 'a measured overlap')
+
+
 class HttpCameras:
     """Two network cameras in the synthetic scene.
 
@@ -120,7 +130,7 @@ class Field(RigProcesses):
         """Wait for a steady panorama, and save its overlap."""
         wait_for(lambda: self.check_alive() or self.health.newest, START_S, 'a first panorama')
         # Until the cameras' image circles are known, it is measured anew.
-        wait_for(lambda: self.health.calibrate(save=True).success, START_S, 'the overlap')
+        calibrated(self.health, save=True)
         self.health.settle()
 
     def endpoints(self, node: str) -> set[bytes]:

@@ -4,6 +4,7 @@ import json
 import math
 
 import pytest
+from field import calibrated
 from known_rigs import folder_rig
 
 from fisheye_testing.data import real_data
@@ -74,8 +75,7 @@ def test_corrected_images_of_a_tilted_rig_are_stitched_level_too(rig, watcher):
 
 def test_a_rig_that_leans_is_measured_in_its_own_frame(rig, watcher):
     truth = started(rig, watcher, 'nod_12')
-    answer = watcher.calibrate()
-    assert answer.success
+    answer = calibrated(watcher)
     assert 'confidence' in answer.message
     true_deg = truth['relative_deg'][0]
     assert answer.overlaps[0].yaw_deg == pytest.approx(true_deg, abs=CLOSE_DEG)

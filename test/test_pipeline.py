@@ -6,7 +6,7 @@ import os
 import time
 
 import pytest
-from field import MAY_LOSE, START_S
+from field import MAY_LOSE, START_S, STOP_S, calibrated
 from sensor_msgs.msg import CameraInfo, CompressedImage
 
 from fisheye_bridge.camera_info import camera_of
@@ -68,8 +68,9 @@ def test_every_pair_arrives_and_every_node_ends_at_once(rig, watcher, composed):
     # Other work on the machine ends some time.
     wait_for(every_pair_arrives, START_S, 'a while in which hardly a pair gets lost')
     for node in reversed(COMPOSED if composed else SEPARATE):
-        code, _ = rig.stop(node)
+        code, seconds = rig.stop(node)
         assert (node, code) == (node, 0), rig.log(node).read_text()
+        assert seconds < STOP_S
 
 
 def test_the_synthetic_rig_is_stitched_where_it_should_be(rig, watcher):
@@ -81,8 +82,7 @@ def test_the_synthetic_rig_is_stitched_where_it_should_be(rig, watcher):
     assert overlap.offset_x_px == pytest.approx(true_px, abs=CLOSE_PX)
     assert overlap.offset_deg == pytest.approx(140, abs=0.5)
     assert 0 < ns_of(overlap.header.stamp) <= watcher.stamps_ns[-1]
-    answer = watcher.calibrate()
-    assert answer.success
+    answer = calibrated(watcher)
     assert answer.overlaps[0].offset_x_px == pytest.approx(true_px, abs=CLOSE_PX)
     assert math.isnan(answer.overlaps[0].seam_begin_px), 'nothing is drawn with it yet'
     projection = watcher.projection
@@ -119,8 +119,7 @@ def test_real_pictures_are_stitched_where_they_should_be(rig, watcher, real_rig,
 @pytest.mark.parametrize('name', ['apart_lobby', 'apart_mixed'])
 def test_views_without_a_common_scene_stay_side_by_side(rig, watcher, real_rig, name):
     start(rig, watcher, folder=real_rig(name))
-    answer = watcher.calibrate()
-    assert answer.success
+    answer = calibrated(watcher)
     assert not answer.overlaps[0].found
     (overlap,) = watcher.overlaps.overlaps
     assert not overlap.found

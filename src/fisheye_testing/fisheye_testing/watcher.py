@@ -20,10 +20,6 @@ LATCHED = QoSProfile(
     depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
 
-_GOES_ON = 'it goes on'
-"""How the answer ends of a machine that is not done with measuring in time."""
-_CALLS = 3
-
 
 class Watcher:
     """Subscribes to a rig's panorama from a ROS context of its own.
@@ -97,17 +93,14 @@ class Watcher:
         return to_array(taken[0])
 
     def calibrate(self, timeout_s: float = 20.0, **request) -> CalibrateOverlap.Response:
-        """Call the rig's calibrate_overlap service, again while it is still measuring."""
+        """Call the rig's calibrate_overlap service."""
         if not self._client.wait_for_service(timeout_s):
             raise TimeoutError(f'calibrate_overlap was not offered within {timeout_s:g} s')
-        for _ in range(_CALLS):
-            done = threading.Event()
-            future = self._client.call_async(CalibrateOverlap.Request(**request))
-            future.add_done_callback(lambda _, done=done: done.set())
-            if not done.wait(timeout_s):
-                raise TimeoutError(f'calibrate_overlap gave no answer within {timeout_s:g} s')
-            if not future.result().message.endswith(_GOES_ON):
-                break
+        done = threading.Event()
+        future = self._client.call_async(CalibrateOverlap.Request(**request))
+        future.add_done_callback(lambda _: done.set())
+        if not done.wait(timeout_s):
+            raise TimeoutError(f'calibrate_overlap gave no answer within {timeout_s:g} s')
         return future.result()
 
     def _spin(self) -> None:
