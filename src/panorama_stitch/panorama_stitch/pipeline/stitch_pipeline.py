@@ -7,6 +7,7 @@ published. Nothing here calls back: whoever owns the pipeline asks it.
 
 from collections.abc import Sequence
 from concurrent.futures import Future, wait
+from time import monotonic
 
 import numpy as np
 
@@ -27,7 +28,9 @@ from panorama_stitch.pipeline.rig_state import RigState
 from panorama_stitch.pipeline.seam_watch import SeamWatch
 
 _ROOM = 2.0
-"""What a measurement that was asked for gets, in units of what a panorama takes."""
+"""What a measurement that takes long gets, in units of what a panorama takes."""
+_LONG_S = 2.0
+"""Takes long: with a core of its own, a measurement ends earlier."""
 
 
 class StitchPipeline:
@@ -78,6 +81,7 @@ class StitchPipeline:
         self.level = LiveLevel(self.rig)
         self._asked: Future | None = None
         self._asked_what: tuple | None = None
+        self._asked_s = 0.0
         self._dimensions = 0
 
     def take(self, camera: str, stamp_ns: int, image: np.ndarray, encoding: str) -> None:
@@ -137,19 +141,19 @@ class StitchPipeline:
         """
         what = self.settings, method, save
         if self._asked is None or self._asked.done() or self._asked_what != what:
-            self._asked_what = what
+            self._asked_what, self._asked_s = what, monotonic()
             self._asked = self._builder.calibrate(*what)
         return self._asked
 
     def leave_room(self, took_s: float) -> None:
-        """Leave a measurement that was asked for its share of a busy machine.
+        """Leave a measurement that was asked for, and takes long, its share of a busy machine.
 
         Parameters
         ----------
         took_s
             How long the last panorama took; composing would take all there is.
         """
-        if self._asked and not self._asked.done():
+        if self._asked and not self._asked.done() and monotonic() - self._asked_s > _LONG_S:
             wait([self._asked], _ROOM * took_s)
 
     def stop(self) -> None:
