@@ -1,7 +1,6 @@
 """The pipeline: pairs become panoramas, a silent camera is shown as such and comes back."""
 
 import gc
-import threading
 import time
 from dataclasses import replace
 from functools import partial
@@ -15,7 +14,6 @@ from pipeline_line import DEADLINE_S, LENS, SETTINGS, STEP_NS, YAW, Line, overla
 from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.remap import RemapTable
 from panorama_stitch.compose.compositor import Compositor
-from panorama_stitch.pipeline import compositor_builder, stitch_pipeline
 from panorama_stitch.pipeline.metrics import economy_sentence, metrics, unpaired_sentence
 
 TABLES = 3
@@ -165,27 +163,6 @@ def test_cameras_of_different_clocks_are_paired_by_arrival(make_line, pictures):
     assert line.published[-1][0] <= line.stamp_ns - 37 * 10**9, 'the older stamp'
     line.pipeline.apply(SETTINGS)
     line.feed(pictures, lambda: line.published[-1][0] > 0, 'pairs by stamp again')
-
-
-def test_only_a_measurement_that_takes_long_holds_panoramas_up(make_line, pictures, monkeypatch):
-    line, may_end, now_s, wait = make_line(), threading.Event(), Mock(return_value=0.0), Mock()
-    line.feed(pictures, lambda: line.published, 'a panorama')
-    measure = compositor_builder.measure_overlaps
-    monkeypatch.setattr(
-        compositor_builder,
-        'measure_overlaps',
-        lambda *what: may_end.wait(DEADLINE_S) and measure(*what),
-    )
-    monkeypatch.setattr(stitch_pipeline, 'monotonic', now_s)
-    monkeypatch.setattr(stitch_pipeline, 'wait', wait)
-    asked = line.pipeline.calibrate('', save=False)
-    for now_s.return_value in (0.0, 1.9, 2.1):
-        line.pipeline.leave_room(0.03)
-    wait.assert_called_once_with([asked], pytest.approx(0.06))
-    may_end.set()
-    assert asked.result(DEADLINE_S)[0].found
-    line.pipeline.leave_room(0.03)
-    wait.assert_called_once()
 
 
 def test_a_lens_that_changes_with_each_frame_stops_no_panorama(make_line, pictures):

@@ -6,8 +6,7 @@ published. Nothing here calls back: whoever owns the pipeline asks it.
 """
 
 from collections.abc import Sequence
-from concurrent.futures import Future, wait
-from time import monotonic
+from concurrent.futures import Future
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from fisheye_geometry.lens import Lens
 from fisheye_geometry.surface import Surface
 from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.overlap.overlap_result import Overlap
+from panorama_stitch.pipeline.calibration_request import CalibrationRequest
 from panorama_stitch.pipeline.compositor_builder import CompositorBuilder
 from panorama_stitch.pipeline.economy import Economy
 from panorama_stitch.pipeline.frame_sets import FrameSet, FrameSets
@@ -26,11 +26,6 @@ from panorama_stitch.pipeline.panorama import Panorama
 from panorama_stitch.pipeline.panorama_settings import MountSettings, PanoramaOutputSettings
 from panorama_stitch.pipeline.rig_state import RigState
 from panorama_stitch.pipeline.seam_watch import SeamWatch
-
-_ROOM = 2.0
-"""What a measurement that takes long gets, in units of what a panorama takes."""
-_LONG_S = 2.0
-"""Takes long: with a core of its own, a measurement ends earlier."""
 
 
 class StitchPipeline:
@@ -79,9 +74,7 @@ class StitchPipeline:
         self.watch = SeamWatch(self.rig)
         self._builder = CompositorBuilder(self.rig, self.watch)
         self.level = LiveLevel(self.rig)
-        self._asked: Future | None = None
-        self._asked_what: tuple | None = None
-        self._asked_s = 0.0
+        self._calibration = CalibrationRequest(self._builder.calibrate)
         self._dimensions = 0
 
     def take(self, camera: str, stamp_ns: int, image: np.ndarray, encoding: str) -> None:
@@ -134,27 +127,12 @@ class StitchPipeline:
         self._builder.inherit(former.rig)
 
     def calibrate(self, method: str, save: bool) -> Future:
-        """Measure the overlaps anew, off the frame path; as of `CompositorBuilder.calibrate`.
-
-        Whoever asks for the same while it is being measured gets that result: on a slow machine,
-        one who asks again does not wait behind what nobody waits for any more.
-        """
-        what = self.settings, method, save
-        if self._asked is None or self._asked.done() or self._asked_what != what:
-            self._asked_what, self._asked_s = what, monotonic()
-            self._asked = self._builder.calibrate(*what)
-        return self._asked
+        """Measure the overlaps anew, off the frame path; as of `CompositorBuilder.calibrate`."""
+        return self._calibration.ask(self.settings, method, save)
 
     def leave_room(self, took_s: float) -> None:
-        """Leave a measurement that was asked for, and takes long, its share of a busy machine.
-
-        Parameters
-        ----------
-        took_s
-            How long the last panorama took; composing would take all there is.
-        """
-        if self._asked and not self._asked.done() and monotonic() - self._asked_s > _LONG_S:
-            wait([self._asked], _ROOM * took_s)
+        """Hold the next panorama up where a calibration needs it, `CalibrationRequest`."""
+        self._calibration.leave_room(took_s)
 
     def stop(self) -> None:
         """End `next` and the background work."""
