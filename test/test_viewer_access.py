@@ -51,10 +51,11 @@ def test_the_page_asks_for_the_token_before_it_shows_anything(browser, serve):
     page.until(lambda: 'measured anew' in page.text('answer'), 'a calibration')
 
 
-def test_the_address_with_the_token_opens_the_page(browser, serve):
+@pytest.mark.parametrize('copied_with_it', ['', ')'])
+def test_the_address_with_the_token_opens_the_page(browser, serve, copied_with_it):
     server = serve(SURFACES[0], painted(SURFACES[0], 0, 0), host='0.0.0.0')
     url, token = elsewhere(server)
-    page = Page(browser, f'{url}#token={token}')
+    page = Page(browser, f'{url}#token={token}{copied_with_it}')
     page.until(lambda: page.text('condition') == 'Live', 'a live picture')
     assert token not in browser.current_url
 

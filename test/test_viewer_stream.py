@@ -2,9 +2,13 @@
 
 import socket
 import threading
+import time
 from contextlib import closing, suppress
+from math import inf
 from urllib.parse import urlsplit
 
+import cv2
+import numpy as np
 import pytest
 import viewer_page
 from viewer_page import CLOSE_DEG, MAGENTA, SURFACES, Page, painted, patch
@@ -110,11 +114,12 @@ def test_other_machines_need_https_for_h264(browser, serve, is_encrypted, tmp_pa
     assert format_of(page) == expected
 
 
-class SilentRelay:
-    """A way to a port on which nothing comes through for a while, without a word to either end."""
+class Relay:
+    """A way to a port that can become slow, or silent without a word to either end."""
 
     def __init__(self, port):
         self._target, self._is_cut = ('127.0.0.1', port), False
+        self.bytes_per_s = inf
         self._listener = socket.create_server(('127.0.0.1', 0))
         self.port = self._listener.getsockname()[1]
         self._sockets = [self._listener]
@@ -150,7 +155,8 @@ class SilentRelay:
 
     def _carry(self, source, target):
         with suppress(OSError):
-            while data := source.recv(65536):
+            while data := source.recv(4096):
+                time.sleep(len(data) / self.bytes_per_s)
                 if self._is_cut:
                     return
                 target.sendall(data)
@@ -161,7 +167,7 @@ class SilentRelay:
 
 def test_the_page_comes_back_by_itself_when_its_link_was_silent(browser, serve):
     server = serve(SURFACES[0], painted(SURFACES[0], 0, 0))
-    with closing(SilentRelay(urlsplit(server.url).port)) as relay:
+    with closing(Relay(urlsplit(server.url).port)) as relay:
         page = Page(browser, f'http://127.0.0.1:{relay.port}/')
         page.until(lambda: page.text('condition') == 'Live', 'a live picture')
         relay.cut()
@@ -169,6 +175,33 @@ def test_the_page_comes_back_by_itself_when_its_link_was_silent(browser, serve):
         relay.mend()
         page.until(lambda: page.text('condition') == 'Live', 'a live picture')
         assert page.text('format') == 'H.264'
+
+
+def test_a_slow_link_shows_fewer_pictures(browser, serve, before_the_page):
+    before_the_page(
+        'delete window.VideoDecoder;'
+        'const send = WebSocket.prototype.send;'
+        'window.drawn = 0;'
+        'WebSocket.prototype.send = function (word) {'
+        '  window.drawn += word === "drawn";'
+        '  send.call(this, word);'
+        '};'
+    )
+    surface = SURFACES[0]
+    noise = np.random.default_rng(1).integers(0, 255, (surface.height, surface.width, 3), np.uint8)
+    server = serve(surface, noise)
+
+    def drawn():
+        server.tell(delay_ms=20 + time.monotonic() % 1)  # the viewer tells it twice a second
+        return browser.execute_script('return window.drawn')
+
+    with closing(Relay(urlsplit(server.url).port)) as relay:
+        page = Page(browser, f'http://127.0.0.1:{relay.port}/')
+        page.until(lambda: page.text('condition') == 'Live', 'a live picture')
+        jpeg = cv2.imencode('.jpg', noise, (cv2.IMWRITE_JPEG_QUALITY, 95))[1]
+        relay.bytes_per_s = len(jpeg) / 2.5  # the page takes silence of 1.5 s for a lost link
+        before = drawn()
+        page.until(lambda: drawn() > before + 2, 'pictures')
 
 
 def test_the_delay_is_told_and_coloured(browser, serve):

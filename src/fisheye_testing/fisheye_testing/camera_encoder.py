@@ -61,14 +61,15 @@ class Encoder:
 
     def _run(self):
         arguments = self._arguments
-        start_ns = None
+        # A sender report takes the time of the header for that of the stream's beginning.
+        self._output.start_encoding()
+        start_ns = time.time_ns()
         for number, image in enumerate(
             pictures(arguments.width, arguments.height, arguments.rate)
         ):
             if number == _GONE:
                 self._is_running.set()
             now_ns = time.time_ns()
-            start_ns = start_ns or now_ns
             frame = av.VideoFrame.from_ndarray(image, format='bgr24')
             frame.pts = (now_ns - start_ns) * CLOCK_HZ // 10**9
             frame.time_base = Fraction(1, CLOCK_HZ)

@@ -135,7 +135,8 @@ class Browser:
 
     def _give_up(self, reason: str = '') -> None:
         """Go on with JPEG; a reason is for the page to show."""
-        self._feed, self._no_video, self._told = JpegFeed(), reason, None
+        self._feed = JpegFeed(len(self._under_way))
+        self._no_video, self._told = reason, None
         self.wake()
 
     async def _farewell(self) -> None:

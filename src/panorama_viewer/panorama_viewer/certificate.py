@@ -12,7 +12,7 @@ from cryptography.hazmat.primitives.hashes import SHA256
 from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
-from fisheye_core.errors import FileAccessError
+from fisheye_core.errors import FileAccessError, SettingError
 from fisheye_core.regular_file import replace_regular
 
 _VALID = timedelta(days=820)
@@ -40,6 +40,8 @@ def kept_certificate(path: Path, names: Iterable[str], now: datetime) -> bytes:
     ------
     FileAccessError
         If the file cannot be read or written.
+    SettingError
+        If a name is none that a host can have.
     """
     wanted = {_general_name(name) for name in names}
     try:
@@ -57,7 +59,14 @@ def _general_name(name: str) -> x509.GeneralName:
     try:
         return x509.IPAddress(ip_address(name))
     except ValueError:
+        pass
+    try:
         return x509.DNSName(name.encode('idna').decode())
+    except UnicodeError as error:
+        raise SettingError(
+            f"the host name '{name}' cannot be in a certificate; expected words of 1 to 63 "
+            'letters with dots between, or an address'
+        ) from error
 
 
 def _usable(content: bytes, wanted: set[x509.GeneralName], now: datetime) -> bytes | None:

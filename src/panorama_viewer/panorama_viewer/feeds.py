@@ -33,16 +33,17 @@ class TimedJpeg:
 
 
 class JpegFeed:
-    """Sends a picture as it came when the last one was drawn."""
+    """Sends a picture as it came when all before it were drawn."""
 
     name = 'JPEG'
 
-    def __init__(self):
-        self._is_drawn = True
+    def __init__(self, under_way: int = 0):
+        """Begin where so many pictures are on their way."""
+        self._under_way = under_way
 
     def takes(self, picture: TimedJpeg, now_s: float, unconfirmed: int) -> bool:
         """Return whether the newest picture can be sent now."""
-        return self._is_drawn
+        return not self._under_way
 
     async def coded(self, picture: TimedJpeg) -> bytes:
         """Return what to send of a picture."""
@@ -50,11 +51,11 @@ class JpegFeed:
 
     def sent(self, now_s: float, size: int) -> None:
         """Note that so many bytes were sent."""
-        self._is_drawn = False
+        self._under_way += 1
 
     def drawn(self, now_s: float) -> None:
         """Note that the oldest picture on its way was drawn."""
-        self._is_drawn = True
+        self._under_way -= 1
 
     def restart(self) -> None:
         """Do nothing: each picture stands alone."""

@@ -66,7 +66,12 @@ class Gate:
         failed = None
         for family, _, _, _, address in dict.fromkeys(places):
             try:
-                listener = socket.create_server(address[:2], family=family, backlog=_BACKLOG)
+                listener = socket.create_server(
+                    address[:2],
+                    family=family,
+                    backlog=_BACKLOG,
+                    dualstack_ipv6=address[0] == '::' and socket.has_dualstack_ipv6(),
+                )
             except OSError as error:
                 if error.errno not in (EADDRNOTAVAIL, EAFNOSUPPORT):
                     raise

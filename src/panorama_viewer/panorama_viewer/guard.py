@@ -30,8 +30,20 @@ class Guard:
         What looking and the buttons need; empty where only this machine can look.
     """
 
-    def __init__(self, host: str, token: str, is_public: bool):
-        self.token, self._is_public = token, is_public
+    def __init__(self, host: str, token: str, *, is_public: bool, is_certified: bool):
+        """Set up.
+
+        Parameters
+        ----------
+        host, token
+            As of the settings, and what others have to know.
+        is_public
+            Whether all may look.
+        is_certified
+            Whether a certificate that others issued says under which names this machine is found:
+            no other site has it, so a browser comes under no strange name.
+        """
+        self.token, self._is_public, self._is_certified = token, is_public, is_certified
         name = socket.gethostname().lower()
         self._names = {host.lower(), 'localhost', name, f'{name}.local'}
 
@@ -71,7 +83,7 @@ class Guard:
 
         A site that has its name lead here (DNS rebinding) gives itself away by that name.
         """
-        if not self._is_ours(request.host):
+        if not self._is_certified and not self._is_ours(request.host):
             raise web.HTTPForbidden(
                 text=f'{request.host!r:.100} is not this machine; expected its address'
             )

@@ -69,7 +69,7 @@ class ViewerServer:
         self.address = self.url = ''
         self._settings = settings
         self._tls = tls
-        self._site = Site(settings, calibrate, watched, tls.own if tls else b'')
+        self._site = Site(settings, calibrate, watched, tls)
         self._faults = Faults(report)
         self._loop = asyncio.new_event_loop()
         self._loop.set_exception_handler(self._faults.in_loop)

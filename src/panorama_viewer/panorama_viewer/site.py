@@ -18,6 +18,7 @@ from panorama_viewer.guard import HEADERS, SUBPROTOCOL, Guard, offers
 from panorama_viewer.pages import page, pages
 from panorama_viewer.projection import Quaternion
 from panorama_viewer.settings import ViewerSettings
+from panorama_viewer.tls import Tls
 from panorama_viewer.token import kept_token, new_token
 
 _CLOSE_S = 1.0
@@ -45,9 +46,9 @@ class Site:
         settings: ViewerSettings,
         calibrate: Callable[[], Future],
         watched: Callable[[], None],
-        certificate: bytes = b'',
+        tls: Tls | None = None,
     ):
-        """Prepare; the parameters are those of `ViewerServer`, and a certificate to hand out.
+        """Prepare; the parameters are those of `ViewerServer`.
 
         Raises
         ------
@@ -57,8 +58,13 @@ class Site:
         self.token = _token(settings)
         self.browsers = Audience(settings.max_clients, self._audience_changed)
         self._calibrate, self._watched = calibrate, watched
-        self._certificate = certificate
-        self._guard = Guard(settings.host, self.token, settings.public)
+        self._certificate = tls.own if tls else b''
+        self._guard = Guard(
+            settings.host,
+            self.token,
+            is_public=settings.public,
+            is_certified=tls is not None and not tls.own,
+        )
         self._settings = settings
         self._worker = ThreadPoolExecutor(1, 'encode')
         self._picture: TimedJpeg | None = None

@@ -34,7 +34,7 @@ def tls_of(settings: ViewerSettings, addresses: Iterable[str]) -> Tls | None:
     Raises
     ------
     SettingError
-        If certificate and key cannot be used together.
+        If certificate and key cannot be used together, or `host` is no name of a host.
     FileAccessError
         If the own certificate cannot be read or written.
     """

@@ -8,7 +8,7 @@ from serving import address, picture, state, visit
 
 from fisheye_core.errors import VideoError
 from fisheye_core.video import video_decoder
-from panorama_viewer.feeds import DELTA, KEYFRAME
+from panorama_viewer.feeds import DELTA, KEYFRAME, JpegFeed
 from panorama_viewer.settings import ViewerSettings
 
 PROTOCOLS = ('panorama', 'h264')
@@ -104,6 +104,16 @@ def test_a_page_can_give_h264_up(serve):
             assert await picture(stream) == jpeg(1)[1]
 
     visit(scenario)
+
+
+def test_a_jpeg_waits_for_all_that_is_on_its_way():
+    feed = JpegFeed(under_way=2)  # H.264 that was sent before it was given up
+    for _ in range(2):
+        assert not feed.takes(None, 0.0, 0)
+        feed.drawn(0.0)
+    assert feed.takes(None, 0.0, 0)
+    feed.sent(0.0, 1000)
+    assert not feed.takes(None, 0.0, 0)
 
 
 def test_who_asks_for_h264_does_not_change_what_others_get(serve):

@@ -3,11 +3,11 @@
 import asyncio
 import socket
 import ssl
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from datetime import datetime, timedelta, timezone
 from urllib.error import HTTPError
 from urllib.parse import urlsplit
-from urllib.request import urlopen
+from urllib.request import Request, urlopen
 
 import pytest
 from cryptography import x509
@@ -149,6 +149,26 @@ def test_the_certificate_of_the_user_is_used(serve, tls, tmp_path):
         with pytest.raises(HTTPError, match='404'):
             urlopen(f'{server.address}certificate.crt', context=trusting(trusted))
         assert not is_trusted(server, trusting(tls.own))
+
+
+@pytest.mark.parametrize('is_own', [False, True])
+def test_under_which_name_a_browser_comes_is_said_by_the_users_certificate(
+    serve, tls, tmp_path, is_own
+):
+    path = tmp_path / 'theirs.pem'
+    kept_certificate(path, ['robot.example.com', '127.0.0.1'], datetime.now(timezone.utc))
+    theirs = tls_of(ViewerSettings(https=True, certificate=str(path)), ())
+    server = serve(tls=tls if is_own else theirs)
+    asked = Request(server.address, headers={'Host': 'robot.example.com:8080'})
+    trusted = trusting(tls.own) if is_own else ssl.create_default_context(cafile=path)
+    with pytest.raises(HTTPError, match='403') if is_own else nullcontext():
+        urlopen(asked, context=trusted).close()
+
+
+def test_a_host_that_no_certificate_can_name_is_a_sentence(tmp_path, monkeypatch):
+    monkeypatch.setenv('ROS_HOME', str(tmp_path))
+    with pytest.raises(SettingError, match=r"the host name 'robot\.\.local' cannot be in a cert"):
+        tls_of(ViewerSettings(https=True, host='robot..local'), ())
 
 
 def test_certificates_that_cannot_be_used_are_sentences(tls, tmp_path):

@@ -135,6 +135,12 @@ def test_a_port_in_use_is_a_sentence():
             server.start()
 
 
+@pytest.mark.skipif(not socket.has_dualstack_ipv6(), reason='this machine has no IPv6')
+def test_every_address_of_ipv6_are_those_of_ipv4_too(serve):
+    server = serve(host='::')
+    assert request('GET', here(server))[0] == 200
+
+
 def test_an_address_of_another_machine_is_a_sentence():
     server = unserved(host='203.0.113.7', port=0)
     with pytest.raises(SettingError, match=r'cannot serve on port 0 of 203\.0\.113\.7'):

@@ -1,6 +1,7 @@
 // The connection to the viewer: state and pictures; it comes back by itself.
 
 const SILENT_MS = 1500; // the server tells its state twice a second
+const MOST_SILENT_MS = 30000; // a slow link may need so long for one picture
 const CONNECT_MS = 400; // a first packet that got lost would be sent again after a second
 const MOST_CONNECT_MS = 4000; // also for a first connection
 const ATTEMPTS = 10; // before a connection gets more time
@@ -18,6 +19,7 @@ export class Live {
     this.on = on;
     this.isRefused = false;
     this.attempts = 0;
+    this.cuts = 0; // connections given up while they were open, since pictures came in good time
     this.connected_ms = MOST_CONNECT_MS; // what it took to connect
     this.open();
     setInterval(() => this.watch(), LOOK_MS);
@@ -59,6 +61,7 @@ export class Live {
 
   async take(socket, data) {
     if (socket !== this.socket) return; // what comes late of a connection that was given up
+    const isInTime = performance.now() - this.heard < SILENT_MS;
     this.heard = performance.now();
     this.attempts = 0;
     if (typeof data === 'string') {
@@ -72,6 +75,7 @@ export class Live {
       this.on.state(message);
       return;
     }
+    if (isInTime) this.cuts = 0;
     try {
       await this.on.picture(data, this.orientation);
     } finally {
@@ -82,7 +86,9 @@ export class Live {
 
   /** How long the connection may be silent, ms: it comes up at once where there is a link. */
   get patience() {
-    if (this.socket.readyState === WebSocket.OPEN) return SILENT_MS;
+    if (this.socket.readyState === WebSocket.OPEN) {
+      return Math.min(SILENT_MS * 2 ** this.cuts, MOST_SILENT_MS);
+    }
     const usual = Math.max(CONNECT_MS, 2 * this.connected_ms);
     return Math.min(usual * 2 ** Math.floor(this.attempts / ATTEMPTS), MOST_CONNECT_MS);
   }
@@ -91,7 +97,10 @@ export class Live {
   watch() {
     if (document.hidden || this.isRefused) return;
     if (performance.now() - this.heard < this.patience) return;
-    if (this.socket.readyState === WebSocket.OPEN) this.on.lost('');
+    if (this.socket.readyState === WebSocket.OPEN) {
+      this.cuts += 1;
+      this.on.lost('');
+    }
     this.open();
   }
 }

@@ -3,6 +3,9 @@
 const $ = (id) => document.getElementById(id);
 const KEY = 'token';
 
+/** What can be in a token: anything else cannot be in a WebSocket's request. */
+const cleaned = (text) => text.replace(/[^\w-]/g, '');
+
 export class Token {
   /** `given` is called when somebody has typed one. */
   constructor(given) {
@@ -14,7 +17,7 @@ export class Token {
 
   /** Take the token out of the address, where others could read it. */
   take() {
-    const token = new URLSearchParams(location.hash.slice(1)).get(KEY);
+    const token = cleaned(new URLSearchParams(location.hash.slice(1)).get(KEY) ?? '');
     if (!token) return false;
     sessionStorage.setItem(KEY, token);
     history.replaceState(null, '', location.pathname);
@@ -43,8 +46,7 @@ export class Token {
     $('token').value = '';
     dialog.showModal();
     await new Promise((closed) => { dialog.onclose = closed; });
-    // Nothing else can be in a token, nor in a WebSocket's request.
-    const typed = $('token').value.replace(/[^\w-]/g, '');
+    const typed = cleaned($('token').value);
     if (dialog.returnValue !== 'use' || !typed) return '';
     sessionStorage.setItem(KEY, typed);
     this.given();
