@@ -190,6 +190,7 @@ def test_views_and_their_parameters_change_while_the_node_runs(rig, watcher, set
         ({'front__hfov_deg': 0.0}, 'front.hfov_deg'),
         ({'front__hfov_deg': 179.0}, 'front.hfov_deg'),
         ({'views': [f'v{i}' for i in range(20)]}, 'views has 20 names; expected up to 8'),
+        ({'views': ['v' * 200]}, 'expected a letter, then letters, digits or _, up to 100 in all'),
         ({'views': ['left']}, "views has 'left', whose topics are those of a camera already"),
     ):
         (result,) = set_parameters(**values)
@@ -206,7 +207,7 @@ def test_views_and_their_parameters_change_while_the_node_runs(rig, watcher, set
     )
 
 
-def test_a_view_is_steered(rig, watcher, diagnosed):
+def test_a_view_is_steered(rig, watcher, diagnosed, set_parameters):
     consumer = Consumer(watcher.node, 'ptz')
     wait_for(consumer.both, START_S, 'a pair')
     look = watcher.node.create_publisher(Vector3Stamped, 'ptz/look', 1)
@@ -227,6 +228,9 @@ def test_a_view_is_steered(rig, watcher, diagnosed):
     assert len(between) >= 3, 'smooth, and camera_info follows picture by picture'
     image, info = consumer.both()
     assert psnr(to_array(image), truth(info, image, 60, -10)) > FAITHFUL_DB - 3
+    (result,) = set_parameters(ptz__pitch_deg=0.0)  # as it is already
+    assert result.successful, result.reason
+    wait_for(lambda: abs(consumer.both()[1].k[0] - 160) < 0.01, START_S, 'rest')
     turn(np.nan, 0, 0)
     words = 'x of look is nan; expected a finite number of rad'
     wait_for(

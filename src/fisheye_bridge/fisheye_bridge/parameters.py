@@ -67,7 +67,10 @@ class Parameters:
             start = list(default) if isinstance(default, tuple) else default
             full_name = prefix + name
             anything = ParameterDescriptor(dynamic_typing=True)
-            parameter = node.declare_parameter(full_name, start, anything)
+            if node.has_parameter(full_name):  # of settings that were not possible before
+                parameter = node.get_parameter(full_name)
+            else:
+                parameter = node.declare_parameter(full_name, start, anything)
             values[name] = convert(full_name, parameter.value, kind, rule)
             typed = _typed(full_name, values[name])
             if typed.type_ != parameter.type_:

@@ -159,6 +159,15 @@ def test_prefixes_keep_two_sets_apart(make_node):
     assert (left.settings.blend, right.settings.blend) == ('none', 'feather')
 
 
+def test_a_bad_start_can_be_put_right(make_node):
+    node = make_node(**{'front.rate_hz': 5000.0})
+    for _ in range(2):
+        with pytest.raises(SettingError, match=r'front\.rate_hz is 5000'):
+            Parameters(node, NodeSettings, prefix='front.')
+    node.set_parameters([Parameter('front.rate_hz', value=20.0)])
+    assert Parameters(node, NodeSettings, prefix='front.').settings.rate_hz == 20.0
+
+
 def test_what_nobody_declared_is_named(make_node):
     node = make_node(
         **{

@@ -83,6 +83,13 @@ def ocam_text(lens):
     )
 
 
+OCAM_AHEAD = (
+    '#polynomial coefficients for\n\n5 500.0 0 1e-3 0 0\n\n#inverse\n\n3 1 1 1\n\n#center\n\n'
+    '238 322\n\n#affine parameters\n\n1.0 0.0 0.0\n\n#image size\n\n480 640\n'
+)
+"""Its axis points ahead, where Scaramuzza's points back."""
+
+
 def test_double_sphere_of_kalibr(tmp_path):
     truth = foreign_lens('double_sphere', 200)
     xi, alpha = truth.distortion
@@ -189,6 +196,10 @@ def test_ros_reads_what_is_written_for_it(tmp_path):
         (mrcal('LENSMODEL_CAHVOR', [1, 2, 3, 4]), 'LENSMODEL_CAHVOR; expected LENSMODEL_PINHOLE'),
         (mrcal('LENSMODEL_PINHOLE', [1, 2]), 'it lacks something'),
         ('#polynomial coefficients for\n3 1 2\n', 'expected 3'),
+        ('width: 640\n\ncamera_model: pinhole\n', 'image_height'),
+        ('cams:\n  camera_model: pinhole\n', 'it lacks something'),
+        ('x: 3\n camera_model: pinhole\n', 'it lacks something|not'),
+        (OCAM_AHEAD, 'the model sees nothing of its picture'),
         ('%YAML:1.0\n---\nK: 3\n', 'it lacks something|it has none of'),
         ("{'lensmodel': open('/etc/passwd')}", 'it lacks something|image_width|not'),
     ],

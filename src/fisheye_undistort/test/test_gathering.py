@@ -43,6 +43,16 @@ def test_foreign_and_unreadable_pictures_are_skipped_by_name(boards):
     assert '480x640 px; most have 640x480' in collector.skipped['portrait.png']
 
 
+def test_pictures_that_cannot_be_read_may_come_first(boards):
+    broken = [
+        NamedPicture(f'{i}.heic', np.empty((0, 0), np.uint8), problem=f'{i}.heic is broken')
+        for i in range(10)
+    ]
+    collector = gather(lambda: [*broken, *boards], Detector(BOARD)).collector
+    assert len(collector.views) == 3
+    assert len(collector.skipped) == 10
+
+
 def test_progress_is_told(boards):
     lines = []
     gather(lambda: boards, Detector(BOARD), lines.append)

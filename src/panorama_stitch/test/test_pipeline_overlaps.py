@@ -6,10 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pipeline_line import DEADLINE_S, SETTINGS, overlap_in_use
+from pipeline_line import DEADLINE_S, LENS, SETTINGS, overlap_in_use
 
+from fisheye_capture.scene import Scene
 from fisheye_core.errors import FileAccessError, ImageFormatError, OverlapError
+from fisheye_geometry.attitude import Attitude
+from panorama_stitch.overlap.overlap_result import side_by_side
 from panorama_stitch.pipeline import compositor_builder
+
+LENS_SURFACE = SETTINGS.surface_of(LENS)
 
 
 def test_panoramas_go_on_while_the_overlap_is_measured(make_line, pictures):
@@ -41,6 +46,33 @@ def test_an_answer_without_overlap_never_replaces_a_good_one(make_line, pictures
     line.feed(dark, lambda: time.monotonic() > end, 'time to forget the bright pictures')
     assert not line.pipeline.calibrate('', save=False).result(DEADLINE_S)[0].found
     assert overlap_in_use(line) == good
+
+
+def test_what_was_found_before_stays_while_the_rest_is_sought(make_line, monkeypatch):
+    cameras = 'left', 'front', 'right'
+    line = make_line(replace(SETTINGS, cameras=cameras))
+    yaws = np.radians((-80, 0, 80))
+    pictures = {
+        camera: Scene().view(LENS, Attitude(yaw_rad=yaw)).frame(0)
+        for camera, yaw in zip(cameras, yaws, strict=True)
+    }
+    measure, tries = compositor_builder.measure_overlaps, []
+
+    def measure_one(*arguments):
+        tries.append(len(tries))
+        return [
+            overlap if index == tries[-1] else side_by_side(LENS_SURFACE, 'particles', '')
+            for index, overlap in enumerate(measure(*arguments))
+        ]
+
+    monkeypatch.setattr(compositor_builder, 'measure_overlaps', measure_one)
+
+    def found():
+        return [overlap.found for overlap in line.pipeline.overlaps]
+
+    line.feed(pictures, lambda: found() == [True, False], 'the first overlap')
+    line.feed(pictures, lambda: found() == [True, True], 'the other one too')
+    assert tries == [0, 1]
 
 
 def test_night_at_start_is_tried_again(make_line, pictures):

@@ -22,6 +22,7 @@ from panorama_stitch.compose.layout import covered
 from panorama_stitch.compose.placing import leads_around, place
 from panorama_stitch.compose.posing import views_of_rig
 from panorama_stitch.compose.view import View
+from panorama_stitch.pipeline.stale import write_age
 
 FAITHFUL_DB = 40.0
 """A bilinear resampling of an antialiased scene stays above it, and one camera of four that is off
@@ -193,6 +194,21 @@ def test_lenses_and_sizes_may_differ():
     truth = Scene().view(layout.surface).frame(STAMP_NS)
     assert psnr(out, truth) > COARSE_DB
     assert len(layout.seams) == 2
+
+
+def test_a_camera_that_others_cover_has_no_columns():
+    lenses = FISHEYE, synthetic_lens(320, 240, np.radians(60)), FISHEYE
+    views, images = [], []
+    for lens, yaw_deg in zip(lenses, (-45, 0, 45), strict=True):
+        attitude = Attitude(np.radians(yaw_deg))
+        views.append(View(lens, surface_for(lens), attitude=attitude))
+        images.append(Scene().view(lens, attitude).frame(STAMP_NS))
+    layout, out = composed(views, images, False, Style(blend='none'))
+    columns = layout.shown_columns(1)
+    assert columns[0] == columns[1]
+    before = out.copy()
+    write_age(out, columns, 'front', 3.0)
+    assert (out == before).all()
 
 
 def test_corrected_pictures_of_a_ring_are_copied():

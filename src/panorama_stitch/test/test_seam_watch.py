@@ -1,12 +1,16 @@
 """The watch on the seams: it tells drift and quality of a rig that moves in its mount."""
 
+from unittest.mock import Mock
+
 import numpy as np
 import pytest
 
 from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens
+from fisheye_core.errors import BugError
 from fisheye_geometry.attitude import Attitude
 from panorama_stitch.overlap.monitor import SeamState
+from panorama_stitch.pipeline import seam_watch
 from panorama_stitch.pipeline.panorama_settings import PanoramaSettings
 from panorama_stitch.pipeline.rig_measurement import measure_overlaps
 from panorama_stitch.pipeline.rig_state import RigState
@@ -61,6 +65,17 @@ def test_a_mount_that_moved_is_told_with_the_remedy(rig, watch):
     assert state.drift_deg == pytest.approx(2.0, abs=CLOSE_DEG)
     assert state.quality < 0.5
     assert watch.metrics()['left-right overlap drift deg'] == state.drift_deg
+
+
+def test_a_bug_is_told_until_it_looks_again(rig, watch, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr(seam_watch, 'OverlapView', Mock(side_effect=IndexError('out of range')))
+        with pytest.raises(BugError):
+            watch.take(seen(), rig.overlaps).result(DEADLINE_S)
+        (complaint,) = watch.complaints()
+        assert 'the overlaps are not watched: a bug, IndexError: out of range' in complaint
+    looked(watch, rig, seen())
+    assert watch.complaints() == []
 
 
 def test_it_looks_once_a_second(rig, watch):

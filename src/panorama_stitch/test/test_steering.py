@@ -91,6 +91,17 @@ def test_a_view_at_rest_is_drawn_exactly_and_one_that_moves_soon(pair):
     assert came[-1] == 0
 
 
+def test_a_view_that_was_steered_goes_back_to_rest(pair):
+    settings = ViewSettings()
+    view = LiveView('front', settings)
+    panorama = Panorama(*pair, STAMP_NS, 'bgr8', {})
+    view.look(0.5, 0.0, 0.0)
+    view.apply(settings)
+    assert view.moves
+    view.rest()
+    assert view.aim(panorama) == view.aim()
+
+
 def test_what_silent_cameras_alone_see_is_not_drawn(pair):
     compositor, images = pair
     view, out = LiveView('left_view', ViewSettings()), np.empty((480, 640, 3), np.uint8)

@@ -61,12 +61,14 @@ def gather(
     CalibrationError
         If they do not show the target; the sentence says what they show.
     """
-    first = list(islice(read(), _FIRST))
-    asked = detector.target
-    detector = replace(detector, target=better_layout(_readable(first), detector))
-    collector, missed = _collect(first, detector, progress)
-    other, seen = guess(missed, detector) if missed and not collector.found_any else (None, '')
-    detector = replace(detector, target=other or detector.target)
+    first = list(islice((picture for picture in read() if not picture.problem), _FIRST))
+    asked, seen = detector.target, ''
+    if first:
+        detector = replace(detector, target=better_layout(first, detector))
+        collector, missed = _collect(first, detector, progress)
+        if missed and not collector.found_any:
+            other, seen = guess(missed, detector)
+            detector = replace(detector, target=other or detector.target)
     note = note_of(detector.target, asked)
     collector, missed = _collect(read(), detector, progress)
     if not collector.found_any and seen:
@@ -83,10 +85,6 @@ def gather(
 def note_of(shown: Target, asked: Target) -> str:
     """Return what the user should know of the target that pictures show."""
     return f'the pictures show {shown}; {asked} was asked for' if shown != asked else ''
-
-
-def _readable(pictures: Iterable[NamedPicture]) -> list[NamedPicture]:
-    return [picture for picture in pictures if not picture.problem]
 
 
 def _collect(pictures, detector, progress) -> tuple[Collector, list[NamedPicture]]:

@@ -46,7 +46,7 @@ def read_foreign(path: str | Path) -> tuple[Samples, str]:
         raise
     except (FileContentError, CalibrationError) as error:
         raise CameraFileError(error, path) from error
-    except (KeyError, IndexError, TypeError, ValueError, SyntaxError, cv2.error) as error:
+    except (LookupError, TypeError, ValueError, SyntaxError, cv2.error) as error:
         raise CameraFileError(
             f'it lacks something ({error!r:.80}); expected {_KNOWN}', path
         ) from error
@@ -54,7 +54,7 @@ def read_foreign(path: str | Path) -> tuple[Samples, str]:
 
 def _kalibr(text: str, path: str | Path) -> tuple[Samples, str]:
     chain = parse_mapping(text)
-    camera: Any = next(value for value in chain.values() if isinstance(value, dict))
+    camera: Any = next((value for value in chain.values() if isinstance(value, dict)), None)
     model, distortion = camera['camera_model'], camera.get('distortion_model', 'none')
     width, height = camera['resolution']
     numbers = [float(value) for value in camera['intrinsics']]
@@ -171,7 +171,7 @@ def _camera_info(text: str, path: str | Path) -> tuple[Samples, str]:
 
 _READERS = (
     (r'^\s*[\'"]?lensmodel[\'"]?\s*:', _mrcal),
-    (r'^\s+camera_model\s*:', _kalibr),
+    (r'^[ \t]+camera_model\s*:', _kalibr),
     (r'^#.*polynomial coefficients', _ocam),
     (r'^%YAML|<opencv_storage>', _opencv),
     ('', _camera_info),

@@ -23,11 +23,20 @@ class Samples:
         (N, 3) and (N, 2) px.
     size
         Width and height of the picture, px.
+
+    Raises
+    ------
+    CalibrationError
+        If there are no points.
     """
 
     rays: np.ndarray
     pixels: np.ndarray
     size: tuple[int, int]
+
+    def __post_init__(self):
+        if not len(self.rays):
+            raise CalibrationError('the model sees nothing of its picture')
 
 
 def samples_of_projection(
@@ -52,8 +61,6 @@ def samples_of_projection(
         grows = np.diff(radius, axis=1, prepend=0.0) > 0
     inside = np.all((pixels > -0.5) & (pixels < np.array(size) - 0.5), axis=-1)
     use = np.logical_and.accumulate(grows, axis=1) & inside
-    if not use.any():
-        raise CalibrationError('the model sees nothing of its picture')
     return Samples(rays[use], pixels[use], size)
 
 

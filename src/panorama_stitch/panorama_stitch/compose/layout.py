@@ -75,9 +75,13 @@ class Layout:
         return self.seams[at - 1].begin - (0 if at else width), self.seams[at].end
 
     def shown_columns(self, index: int) -> tuple[int, int]:
-        """Columns of the picture in which a camera is drawn: the wider part if it is in two."""
+        """Columns of the picture in which a camera is drawn: the wider part if it is in two.
+
+        Where others show all that it sees, `begin` is `end`.
+        """
         begin, end = self.drawn(index)
-        return max(wrapped(begin, end, self.surface.width), key=lambda part: part[1] - part[0])
+        parts = wrapped(begin, end, self.surface.width)
+        return max(parts, key=lambda part: part[1] - part[0], default=(begin, begin))
 
 
 def wrapped(begin: int, end: int, width: int) -> list[tuple[int, int]]:

@@ -75,6 +75,10 @@ class ViewPublisher:
         """Use other settings from the next picture on."""
         self._view.apply(settings)
 
+    def rest(self) -> None:
+        """Look where the settings say again, if the view was steered."""
+        self._view.rest()
+
     def take(self, panorama: Panorama) -> None:
         """Publish the view of a panorama soon, unless a newer one comes before."""
         self._worker.put(panorama)

@@ -1,8 +1,10 @@
 """The views of a node: those that its parameter names, and their parameters."""
 
+from collections.abc import Sequence
 from time import monotonic
 
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
 from fisheye_bridge.diagnostics import WARN, Report
 from fisheye_bridge.parameters import Parameters
@@ -75,12 +77,17 @@ class Views:
             self._subscribed = [view for view in list(self._views.values()) if view.wanted]
         return self._subscribed
 
-    def _changed(self, _) -> None:
-        if not self._is_following:  # declaring parameters sets them
-            try:
-                self._follow()
-            except FisheyeError as error:
-                self._node.warn(f'views: {error}')
+    def _changed(self, parameters: Sequence[Parameter]) -> None:
+        if self._is_following:  # declaring parameters sets them
+            return
+        try:
+            self._follow()
+        except FisheyeError as error:
+            self._node.warn(f'views: {error}')
+        for name, view in self._views.items():
+            # A value that it has already takes a steered view back too.
+            if any(parameter.name.startswith(f'{name}.') for parameter in parameters):
+                view.rest()
 
     def _follow(self) -> None:
         """Start the views that are named now, end the others, and tell where all are."""

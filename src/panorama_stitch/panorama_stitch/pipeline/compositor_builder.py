@@ -81,6 +81,7 @@ class CompositorBuilder:
         """Request a new compositor; `forget` what the cameras showed so far."""
         if forget:
             self._recent.forget()
+            self._pause_s = _FIRST_PAUSE_S
         self._due_s = 0.0
 
     def calibrate(self, settings: PanoramaOutputSettings, method: str, save: bool) -> Future:
@@ -142,11 +143,14 @@ class CompositorBuilder:
         remembered = self._recent.all()
         if not found and settings.auto_calibrate and remembered:
             surfaces = rig.surfaces
-            overlaps = self._measured(remembered, settings, settings.method)
+            measured = self._measured(remembered, settings, settings.method)
+            overlaps = kept(measured, rig.overlaps or [])
             if not rig.set_overlaps(overlaps, surfaces):
                 self._due_s = 0.0
                 return
-            if not all(overlap.found for overlap in overlaps):
+            if all(overlap.found for overlap in overlaps):
+                self._pause_s = _FIRST_PAUSE_S
+            else:
                 self._wait(self._pause_s)
                 self._pause_s = min(2 * self._pause_s, _LONGEST_PAUSE_S)
         elif not found and settings.auto_calibrate and is_live:

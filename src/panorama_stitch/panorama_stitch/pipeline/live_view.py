@@ -56,7 +56,12 @@ class LiveView:
     def apply(self, settings: ViewSettings) -> None:
         """Use the settings; where they are others, look where they say."""
         if settings is not self.settings:
-            self.settings, self._steering = settings, None
+            self.settings = settings
+            self.rest()
+
+    def rest(self) -> None:
+        """Look where the settings say again."""
+        self._steering = None
 
     def look(self, yaw_rad: float, pitch_rad: float, hfov_rad: float) -> None:
         """Steer the view; parameters and errors as of `Steering.look`."""

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from fisheye_core.background import Background
-from fisheye_core.errors import FisheyeError
+from fisheye_core.errors import BugError, FisheyeError
 from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.rig import Pair
 from panorama_stitch.overlap.monitor import SeamMonitor, SeamState
@@ -42,6 +42,7 @@ class SeamWatch:
         self._watched: dict[Pair, _Watched] = {}
         self._job: Future | None = None
         self._due_s = 0.0
+        self._bug = ''
 
     @property
     def is_due(self) -> bool:
@@ -71,7 +72,8 @@ class SeamWatch:
     def complaints(self) -> list[str]:
         """Return what is wrong with the overlaps in use, in sentences."""
         cameras = self._rig.cameras
-        return [
+        bugs = [f'the overlaps are not watched: {self._bug}'] if self._bug else []
+        return bugs + [
             f'{cameras[pair.right]} has moved by {state.drift_deg:.1f} degrees against '
             f'{cameras[pair.left]} since their overlap was measured: call calibrate_overlap'
             for pair, state in self.states().items()
@@ -112,7 +114,7 @@ class SeamWatch:
                 one = _Watched(overlap.attitude, SeamMonitor(rotation))
             one.state = one.monitor.look(views[pair.left], views[pair.right], now_s)
             watched[pair] = one
-        self._watched = watched
+        self._watched, self._bug = watched, ''
 
     def _sharpened(self, overlap: Overlap, pair: Pair) -> Overlap:
         one = self._watched.get(pair)
@@ -130,3 +132,4 @@ class SeamWatch:
     def _failed(self, error: FisheyeError) -> None:
         """Forget what was seen: the cameras may have become others."""
         self._watched = {}
+        self._bug = str(error) if isinstance(error, BugError) else ''

@@ -62,8 +62,10 @@ class StaleCameras:
 
 
 def write_age(panorama: np.ndarray, columns: tuple[int, int], camera: str, age_s: float) -> None:
-    """Write into the columns [begin, end) of a silent camera for how long there was no image."""
+    """Write into the columns [begin, end) of a silent camera, if any, how old its image is."""
     begin, end = columns
+    if begin == end:
+        return
     lines = [camera, f'no picture for {age_s:.0f} s']
     scale = _TEXT_SHARE * panorama.shape[0] / _LETTER_PX
     sizes = [cv2.getTextSize(line, _FONT, scale, 1)[0] for line in lines]

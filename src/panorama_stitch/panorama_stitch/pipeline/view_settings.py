@@ -10,6 +10,8 @@ from fisheye_geometry.rig import CAMERA_NAME
 from panorama_stitch.compose.virtual_camera import VirtualCamera
 
 MAX_VIEWS = 8
+_MAX_LETTERS = 100
+"""Of a name: DDS takes topics of up to 255."""
 _YAWS_DEG = {'left': -90.0, 'right': 90.0, 'rear': 180.0, 'back': 180.0}
 """Where views look whose names begin so, if nothing else is said."""
 
@@ -17,9 +19,10 @@ _YAWS_DEG = {'left': -90.0, 'right': 90.0, 'rear': 180.0, 'back': 180.0}
 def check_names(setting_name: str, names: Sequence[str]) -> None:
     """Raise a `SettingError` for a name that a setting has and that is no namespace."""
     for name in names:
-        if not CAMERA_NAME.fullmatch(name):
+        if not CAMERA_NAME.fullmatch(name) or len(name) > _MAX_LETTERS:
             raise SettingError(
-                f"{setting_name} has '{name}'; expected a letter, then letters, digits or _"
+                f"{setting_name} has '{name}'; expected a letter, then letters, digits or _, up "
+                f'to {_MAX_LETTERS} in all'
             )
 
 
