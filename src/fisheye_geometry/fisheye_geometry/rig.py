@@ -102,15 +102,18 @@ class Rig:
         """Neighbours, the closing pair last."""
         return pairs_of(len(self.cameras), self.is_closed)
 
+    def attitudes(self, pair: Pair) -> tuple[Attitude, Attitude]:
+        """Return the attitudes of the left and the right camera."""
+        return self.cameras[pair.left].attitude, self.cameras[pair.right].attitude
+
     def relative(self, pair: Pair) -> Attitude:
         """Return the attitude of the right camera in the frame of the left one."""
-        left, right = (self.cameras[index].attitude.matrix for index in pair)
-        return Attitude.of(left.T @ right)
+        left, right = self.attitudes(pair)
+        return Attitude.of(left.matrix.T @ right.matrix)
 
     def yaw_between(self, pair: Pair) -> float:
         """Return the angle between the axes about the level vertical, rad, to the right."""
-        left, right = (self.cameras[index].attitude.yaw_rad for index in pair)
-        return unwrapped([left, right])[1] - left
+        return bearing_rad(*self.attitudes(pair))
 
 
 def unwrapped(yaws_rad: Sequence[float]) -> tuple[float, ...]:
@@ -123,6 +126,11 @@ def unwrapped(yaws_rad: Sequence[float]) -> tuple[float, ...]:
         step = (after - before + _MOST_TO_THE_LEFT_RAD) % (2 * pi) - _MOST_TO_THE_LEFT_RAD
         bearings.append(bearings[-1] + float(step))
     return tuple(bearings)
+
+
+def bearing_rad(left: Attitude, right: Attitude) -> float:
+    """Return the angle from one axis to another about the level vertical, rad, as `unwrapped`."""
+    return unwrapped([left.yaw_rad, right.yaw_rad])[1] - left.yaw_rad
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ a shift of columns by `focal_px` times the angle; on a `rectilinear` one it is n
 """
 
 from dataclasses import dataclass, replace
-from math import inf, pi
+from math import atan2, inf, pi
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -100,6 +100,15 @@ class Surface:
         """Return the rays (..., 3) at pixels (..., 2), and which there are: all of them."""
         pixels = np.asarray(pixels, float)
         return self.rays(pixels[..., 0], pixels[..., 1]), np.ones(pixels.shape[:-1], bool)
+
+    def row_px(self, depression_rad: float) -> float:
+        """Return the row, straight ahead, at an angle below the axis."""
+        return self.center_y_px + KINDS[self.kind].row(depression_rad) * self.focal_px
+
+    def depression_rad(self, y_px: float) -> float:
+        """Return the angle below the axis of a row, straight ahead; the inverse of `row_px`."""
+        _, y, z = self.rays(self.center_x_px, y_px)
+        return atan2(y, z)
 
     @property
     def size(self) -> tuple[int, int]:

@@ -27,6 +27,16 @@ def test_a_pixel_comes_back_from_its_ray(kind):
     assert np.abs(pixels - np.stack([x, y], -1)).max() < 1e-9
 
 
+@pytest.mark.parametrize('kind', SURFACES)
+@pytest.mark.parametrize('angle_rad', [-0.7, 0.0, 0.4])
+def test_a_row_has_the_angle_of_its_ray(kind, angle_rad):
+    surface = Surface(kind, 640, 400, 200.0, 310.0, 190.0)
+    ray = np.array([0.0, np.sin(angle_rad), np.cos(angle_rad)])
+    y_px = surface.row_px(angle_rad)
+    assert y_px == pytest.approx(surface.project(ray)[0][1])
+    assert surface.depression_rad(y_px) == pytest.approx(angle_rad)
+
+
 def check_kind(how: SurfaceKind):
     """Demand of a kind of surface what the rest of the code takes for granted."""
     a, b = np.meshgrid(np.linspace(-0.9, 0.9, 7), np.linspace(-0.8, 0.8, 5))

@@ -8,8 +8,9 @@ import pytest
 
 from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens
-from fisheye_geometry.attitude import Attitude
-from fisheye_geometry.level import Mount
+from fisheye_geometry.attitude import Attitude, angle_between
+from fisheye_geometry.level import LEVELS, Mount
+from panorama_stitch.overlap.overlap_result import Overlap, with_offset
 from panorama_stitch.pipeline.panorama_settings import PanoramaSettings
 from panorama_stitch.pipeline.rig_measurement import measure_overlaps
 from panorama_stitch.pipeline.rig_state import RigState
@@ -153,12 +154,67 @@ def test_a_mask_of_another_size_is_said_and_left_out(tmp_path):
     assert rig.camera_views[1].body is None
 
 
-def test_an_offset_set_by_hand_keeps_the_tilt():
-    rig = measured(seen(*TILTED))
-    wider = replace(SETTINGS, offset_x_px=(rig.overlaps[0].offset_x_px + 10.0,))
-    (overlap,) = rig.effective_overlaps(wider)
+def rig_that_looks(pitch_deg, settings=SETTINGS):
+    """Return a rig of two cameras that look down as much, and what is measured of them."""
+    left, right = deg(-70, pitch_deg, 0), deg(70, pitch_deg, 0)
+    rig = rig_of(2)
+    between = Attitude.of(left.matrix.T @ right.matrix)
+    rig.overlaps = [Overlap('particles', True, attitude=between)]
+    surfaces = rig.surfaces
+    level = rig.solution(rig.overlaps, settings).rig.attitudes(rig.pairs[0])
+    rig.overlaps = [with_offset(rig.overlaps[0], *surfaces, level)]
+    return rig
+
+
+PITCHES_DEG = (0.0, -8.0, -15.0, -25.0)
+
+
+@pytest.mark.parametrize('pitch_deg', PITCHES_DEG)
+@pytest.mark.parametrize('level', LEVELS)
+def test_the_offset_that_is_told_changes_nothing_when_it_is_set(pitch_deg, level):
+    settings = replace(SETTINGS, level=level)
+    rig = rig_that_looks(pitch_deg, settings)
+    (measured,) = rig.overlaps
+    told = replace(
+        settings, offset_x_px=(measured.offset_x_px,), offset_y_px=(measured.offset_y_px,)
+    )
+    (overlap,) = rig.effective_overlaps(told)
     assert overlap.method == 'manual'
-    assert overlap.attitude.roll_rad == pytest.approx(rig.overlaps[0].attitude.roll_rad)
+    assert angle_between(overlap.attitude.matrix, measured.attitude.matrix) < 1e-9
+    assert overlap.overlap_px == measured.overlap_px
+
+
+@pytest.mark.parametrize('pitch_deg', PITCHES_DEG)
+def test_an_offset_set_by_hand_turns_about_the_level_vertical(pitch_deg):
+    rig = rig_that_looks(pitch_deg)
+    focal_px, by_px = rig.surfaces[0].focal_px, 10.0
+    settings = replace(SETTINGS, offset_x_px=(rig.overlaps[0].offset_x_px + by_px,))
+    left, right = attitudes(rig, settings)
+    assert left[1:] == pytest.approx([pitch_deg, 0], abs=1e-6)
+    assert right[1:] == pytest.approx([pitch_deg, 0], abs=1e-6)
+    assert right[0] - left[0] == pytest.approx(140 + np.degrees(by_px / focal_px))
+    (before,), (after,) = rig.overlaps, rig.effective_overlaps(settings)
+    assert after.overlap_px == pytest.approx(before.overlap_px - by_px)
+
+
+@pytest.mark.parametrize('pitch_deg', PITCHES_DEG)
+def test_a_vertical_offset_set_by_hand_moves_the_right_horizon(pitch_deg):
+    rig = rig_that_looks(pitch_deg)
+    (measured,) = rig.overlaps
+    settings = replace(SETTINGS, offset_y_px=(measured.offset_y_px + 1.0,))
+    (overlap,) = rig.effective_overlaps(settings)
+    turned_rad = angle_between(overlap.attitude.matrix, measured.attitude.matrix)
+    row_rad = np.cos(np.radians(pitch_deg)) ** 2 / rig.surfaces[0].focal_px
+    assert turned_rad == pytest.approx(row_rad, rel=0.01)
+
+
+def test_an_offset_set_by_hand_turns_cameras_from_where_their_mounts_say():
+    rig = rig_of(2, [Mount(*np.radians(angles)) for angles in ((-70, -15, 0), (70, -15, 0))])
+    surface = rig.surfaces[0]
+    settings = replace(SETTINGS, offset_x_px=(np.radians(130) * surface.focal_px,))
+    left, right = attitudes(rig, settings)
+    assert right[0] - left[0] == pytest.approx(130)
+    assert (*left[1:], *right[1:]) == pytest.approx((-15, 0, -15, 0), abs=1e-6)
 
 
 def test_views_agree_at_a_distance_on_request():

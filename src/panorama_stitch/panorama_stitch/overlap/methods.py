@@ -15,7 +15,7 @@ from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.level import levelled
 from fisheye_geometry.remap import remap_table
-from fisheye_geometry.rig import unwrapped
+from fisheye_geometry.rig import bearing_rad
 from fisheye_geometry.surface import Surface
 from panorama_stitch.overlap import wording
 from panorama_stitch.overlap.corrected_overlap import grey_of, measure_corrected
@@ -162,8 +162,7 @@ def _is_wanted(attitude: Attitude, pair: PairInput, settings: OverlapSettings) -
     if pair.expected is not None or isnan(settings.expected_yaw_deg):
         return True
     # The angle is meant about the vertical, which mounts that look down alike tell.
-    left, right = (Attitude.of(level) for level in levelled([np.eye(3), attitude.matrix]))
-    yaw_rad = unwrapped([left.yaw_rad, right.yaw_rad])[1] - left.yaw_rad
+    yaw_rad = bearing_rad(*map(Attitude.of, levelled([np.eye(3), attitude.matrix])))
     apart_rad = abs(yaw_rad - radians(settings.expected_yaw_deg))
     return apart_rad <= radians(settings.yaw_tolerance_deg)
 

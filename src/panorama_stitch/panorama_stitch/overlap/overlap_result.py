@@ -1,11 +1,12 @@
 """What overlap calibration finds out about two neighbouring cameras."""
 
 from dataclasses import dataclass, replace
-from math import atan2, degrees, isnan, nan, radians, tan
+from math import degrees, isnan, nan, radians
 
 import numpy as np
 
-from fisheye_geometry.attitude import LEVEL, Attitude, rotation_matrix
+from fisheye_geometry.attitude import Attitude, rotation_matrix
+from fisheye_geometry.rig import bearing_rad
 from fisheye_geometry.surface import Surface
 from panorama_stitch.overlap.particles import Particle
 
@@ -112,6 +113,12 @@ def side_by_side(surface_left: Surface, method: str, message: str) -> Overlap:
     )
 
 
+def common_px(offset_x_px: float, left: Surface, right: Surface) -> float:
+    """Return how many columns the images of two neighbours share at an offset."""
+    begin_px, end_px = max(0.0, offset_x_px), min(left.width, offset_x_px + right.width)
+    return max(0.0, end_px - begin_px)
+
+
 def attitude_at(
     offset_x_px: float, offset_y_px: float, left: Surface, right: Surface, tilt: Attitude
 ) -> Attitude | None:
@@ -134,8 +141,8 @@ def attitude_at(
     if not left.yaw_is_column_shift:
         return None
     yaw_rad = yaw_between_rad(offset_x_px, left, right)
-    lower_px = offset_y_px - (left.center_y_px - right.center_y_px)
-    return Attitude(yaw_rad, tilt.pitch_rad - atan2(lower_px, left.focal_px), tilt.roll_rad)
+    higher_rad = right.depression_rad(left.center_y_px - offset_y_px)
+    return Attitude(yaw_rad, tilt.pitch_rad + higher_rad, tilt.roll_rad)
 
 
 def with_offset(
@@ -150,16 +157,12 @@ def with_offset(
     left, right
         What the corrected images of both are on.
     attitudes
-        Of the left and of the right camera, the yaw of the right one after the left one's.
+        Of the left and of the right camera.
     """
     if overlap.attitude is None:
         return overlap
-    yaw_rad = attitudes[1].yaw_rad - attitudes[0].yaw_rad
-    x_px = yaw_rad * left.focal_px + left.center_x_px - right.center_x_px
-    horizons_px = [
-        surface.center_y_px + surface.focal_px * tan(attitude.pitch_rad)
-        for surface, attitude in zip((left, right), attitudes, strict=True)
-    ]
+    yaw_rad = bearing_rad(*attitudes)
+    x_px, y_px = _offset_px(left, right, attitudes)
     message = overlap.message
     if abs(yaw_rad - overlap.attitude.yaw_rad) > _SHOWN_RAD:
         message += f'; {degrees(yaw_rad):.2f} degrees about the level vertical'
@@ -167,27 +170,64 @@ def with_offset(
         overlap,
         message=message,
         offset_x_px=x_px,
-        offset_y_px=horizons_px[0] - horizons_px[1],
-        overlap_px=max(0.0, min(left.width - x_px, right.width)),
+        offset_y_px=y_px,
+        overlap_px=common_px(x_px, left, right),
     )
 
 
+def _offset_px(
+    left: Surface, right: Surface, attitudes: tuple[Attitude, Attitude]
+) -> tuple[float, float]:
+    """Return the offset (x, y) that the level attitudes of both cameras mean."""
+    x_px = bearing_rad(*attitudes) * left.focal_px + left.center_x_px - right.center_x_px
+    horizons_px = [
+        surface.row_px(attitude.pitch_rad)
+        for surface, attitude in zip((left, right), attitudes, strict=True)
+    ]
+    return x_px, horizons_px[0] - horizons_px[1]
+
+
 def overlap_by_hand(
-    measured: Overlap, x_px: float, y_px: float, left: Surface, right: Surface
+    measured: Overlap,
+    x_px: float,
+    y_px: float,
+    left: Surface,
+    right: Surface,
+    attitudes: tuple[Attitude, Attitude],
 ) -> Overlap:
-    """Return an overlap with an offset that a person set; NaN leaves a part as it was measured."""
+    """Return an overlap with an offset that a person set.
+
+    Parameters
+    ----------
+    measured
+        What there is without.
+    x_px, y_px
+        The offset; NaN leaves a part as it was measured.
+    left, right
+        What the corrected images of both are on.
+    attitudes
+        Level ones of both cameras; where no attitude was measured, what is set turns the right
+        one from there.
+    """
     if isnan(x_px) and isnan(y_px):
         return measured
-    x_px = measured.offset_x_px if isnan(x_px) else x_px
-    y_px = measured.offset_y_px if isnan(y_px) else y_px
-    found = measured.found or x_px != measured.offset_x_px
-    tilt = measured.attitude or LEVEL
-    attitude = attitude_at(x_px, y_px, left, right, tilt) if found else None
-    if attitude and measured.attitude:
-        # What was measured says how both images lie; by hand they are only moved.
-        level_px = measured.offset_y_px
-        moved = attitude_at(x_px, y_px - level_px, left, left, LEVEL) or LEVEL
-        attitude = replace(attitude, pitch_rad=tilt.pitch_rad + moved.pitch_rad)
+    found = measured.found or not (isnan(x_px) or x_px == measured.offset_x_px)
+    former_px = measured.offset_x_px, measured.offset_y_px
+    is_turn = found and left.yaw_is_column_shift
+    if is_turn and measured.attitude:
+        # Only the left one is taken as it is drawn: a ring spreads what its rotations miss.
+        turned = attitudes[0].matrix @ measured.attitude.matrix
+        attitudes = attitudes[0], Attitude.of(turned)
+    elif is_turn:
+        former_px = _offset_px(left, right, attitudes)
+    x_px, y_px = (
+        former if isnan(value) else value
+        for former, value in zip(former_px, (x_px, y_px), strict=True)
+    )
+    attitude = None
+    if is_turn:
+        by_px = x_px - former_px[0], y_px - former_px[1]
+        attitude = _moved(attitudes, by_px, right)
     return replace(
         measured,
         method='manual',
@@ -195,5 +235,22 @@ def overlap_by_hand(
         offset_x_px=x_px,
         offset_y_px=y_px,
         attitude=attitude,
+        overlap_px=common_px(x_px, left, right),
         message='set by hand',
     )
+
+
+def _moved(
+    attitudes: tuple[Attitude, Attitude], by_px: tuple[float, float], surface: Surface
+) -> Attitude:
+    """Move the image of the right one of two level attitudes; return it in the left one's frame.
+
+    As the offset does, it turns about the level vertical, and its horizon is moved.
+    """
+    left, right = attitudes
+    moved = Attitude(
+        right.yaw_rad + by_px[0] / surface.focal_px,
+        surface.depression_rad(surface.row_px(right.pitch_rad) - by_px[1]),
+        right.roll_rad,
+    )
+    return Attitude.of(left.matrix.T @ moved.matrix)

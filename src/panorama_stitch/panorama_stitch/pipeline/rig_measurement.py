@@ -5,7 +5,7 @@ from dataclasses import replace
 from math import radians
 
 from fisheye_core.errors import OverlapError
-from fisheye_geometry.rig import Pair, pairs_for, pairs_of, unwrapped
+from fisheye_geometry.rig import Pair, pairs_for, pairs_of
 from panorama_stitch.compose.placing import leads_around
 from panorama_stitch.compose.posing import views_of_rig
 from panorama_stitch.overlap.methods import METHODS, PairInput
@@ -98,10 +98,7 @@ def _with_offsets(
     """Return overlaps with the offsets that their rotations mean once the rig is level."""
     surfaces, count = cameras.surfaces, len(cameras.cameras)
     rig = cameras.solution(overlaps, settings).rig
-    result = []
-    for overlap, pair in zip(overlaps, pairs_for(count, len(overlaps)), strict=True):
-        left, right = (rig.cameras[i].attitude for i in pair)
-        yaw_rad = unwrapped([left.yaw_rad, right.yaw_rad])[1]
-        attitudes = left, replace(right, yaw_rad=yaw_rad)
-        result.append(with_offset(overlap, surfaces[pair.left], surfaces[pair.right], attitudes))
-    return result
+    return [
+        with_offset(overlap, surfaces[pair.left], surfaces[pair.right], rig.attitudes(pair))
+        for overlap, pair in zip(overlaps, pairs_for(count, len(overlaps)), strict=True)
+    ]

@@ -73,8 +73,20 @@ class RigState(MountedCameras):
             else [nan] * len(pairs)
             for values in (settings.offset_x_px, settings.offset_y_px)
         ]
+        if np.isnan(by_hand).all():
+            return list(measured)
+        # What is set by hand must not change when the robot stands on another slope.
+        level = 'symmetric' if settings.level == 'imu' else settings.level
+        rig = self.solve(measured, settings, level=level).rig
         return [
-            overlap_by_hand(overlap, x_px, y_px, surfaces[pair.left], surfaces[pair.right])
+            overlap_by_hand(
+                overlap,
+                x_px,
+                y_px,
+                surfaces[pair.left],
+                surfaces[pair.right],
+                rig.attitudes(pair),
+            )
             for overlap, pair, x_px, y_px in zip(measured, pairs, *by_hand, strict=True)
         ]
 
