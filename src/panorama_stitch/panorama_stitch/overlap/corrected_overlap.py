@@ -15,7 +15,12 @@ from fisheye_geometry.attitude import LEVEL
 from fisheye_geometry.surface import Surface
 from panorama_stitch.overlap import paper, wording
 from panorama_stitch.overlap.corrected_pairs import check_pairs
-from panorama_stitch.overlap.overlap_result import Overlap, attitude_at, side_by_side
+from panorama_stitch.overlap.overlap_result import (
+    Overlap,
+    attitude_at,
+    common_px,
+    side_by_side,
+)
 from panorama_stitch.overlap.overlap_settings import OverlapSettings
 from panorama_stitch.overlap.registration import Registration, fit_at, register
 from panorama_stitch.overlap.search import Search
@@ -107,7 +112,7 @@ class _Measurement:
             offset_x_px=x,
             offset_y_px=0.0,
             attitude=attitude_at(x, 0.0, *self._surfaces, LEVEL),
-            overlap_px=max(0.0, width - x),
+            overlap_px=common_px(x, *self._surfaces),
             confidence=fit_at(self._left, self._right, *self._surfaces, x),
             min_correlation_value=match.min_correlation_value,
             left_particles=left,
@@ -137,7 +142,7 @@ class _Measurement:
             offset_x_px=x,
             offset_y_px=y,
             attitude=attitude_at(x, y, *self._surfaces, found.pose.turn),
-            overlap_px=max(0.0, min(self._surfaces[0].width - x, self._surfaces[1].width)),
+            overlap_px=common_px(x, *self._surfaces),
             confidence=found.confidence,
         )
         rival_x_px = found.rival_x_px + self._half_start if found.distinct < 1 else nan
