@@ -171,6 +171,8 @@ def test_a_scene_that_stands_still(recorded, tmp_path, capsys):
         (['7=a'], "'7=a' names no camera"),
         ([f'c{number}=a' for number in range(9)], '9 cameras; expected 1 to 8'),
         (['left=nowhere'], 'nowhere is not there'),
+        (['rig=a'], "camera 'rig' and the parameters would both be written to rig.yaml"),
+        (['a/b=c', 'a_b=c'], "camera 'a_b' and camera 'a/b' would both be written to a_b.yaml"),
         (['left=a', '--turn', 'up'], "invalid choice: 'up'"),
         (['left=a', '-o', 'nowhere'], 'nowhere cannot be written to: it is no folder'),
     ],
@@ -182,3 +184,8 @@ def test_bad_arguments_are_a_sentence(arguments, told, capsys):
 def test_without_ros_only_topics_are_refused(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, 'panorama_stitch.turn.record_node', None)
     assert '--topics needs ROS 2' in refused(capsys, '--topics', 'left=/left/image_raw')
+
+
+def test_topics_on_which_nothing_came_before_the_end(monkeypatch, capsys):
+    monkeypatch.setattr(record_node, 'record', lambda topics, tracker: None)
+    assert 'only 0 pictures were kept' in refused(capsys, '--topics', 'left=/left/image_raw')

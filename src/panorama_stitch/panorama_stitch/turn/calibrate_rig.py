@@ -9,7 +9,7 @@ from fisheye_core.command_line import CommandParser, exit_code
 from fisheye_core.errors import FileAccessError, SettingError
 from fisheye_geometry.rig import CAMERA_NAME, MAX_CAMERAS
 from panorama_stitch.turn.recording import read_recording
-from panorama_stitch.turn.rig_files import PARAMETERS, write_rig
+from panorama_stitch.turn.rig_files import PARAMETERS, camera_paths, write_rig
 from panorama_stitch.turn.tracker import TurnTracker
 from panorama_stitch.turn.turn_calibration import calibrate_turn
 from panorama_stitch.turn.turn_report import TurnReport
@@ -75,6 +75,7 @@ def _run(options: argparse.Namespace) -> int:
     sources = _sources(options.cameras)
     if not options.output.is_dir():
         raise FileAccessError(options.output, 'written to', 'it is no folder')
+    camera_paths(options.output, tuple(sources))
     tracker = TurnTracker(tuple(sources))
     if options.topics:
         try:

@@ -38,7 +38,7 @@ def closing_frame(frames: Sequence[Frame]) -> int:
     """
     if len(frames) <= _LEAST_FRAMES:
         raise CalibrationError(
-            f'the scene moved so little that only {len(frames)} pictures were kept; expected a '
+            f'only {len(frames)} pictures were kept, each when the scene had moved; expected a '
             'full turn on the spot'
         )
     likeness = _likeness(frames)

@@ -1,10 +1,12 @@
 """Write what a turn told: a camera_info file for each camera, and the mounts as parameters."""
 
+from collections.abc import Sequence
 from math import degrees
 from pathlib import Path
 
 import numpy as np
 
+from fisheye_core.errors import SettingError
 from fisheye_core.yaml_file import write_mapping
 from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.camera_file import Camera, write_camera
@@ -18,6 +20,26 @@ PARAMETERS = 'rig.yaml'
 def mounts_of(attitudes: np.ndarray) -> list[Attitude]:
     """Return how cameras of attitudes (C, 3, 3) are mounted, yaw 0 midway from first to last."""
     return [Attitude.of(attitude) for attitude in levelled(list(attitudes), 'imu', gravity=DOWN)]
+
+
+def camera_paths(folder: Path, cameras: Sequence[str]) -> list[Path]:
+    """Return the file of each camera in a folder.
+
+    Raises
+    ------
+    SettingError
+        If it would be overwritten by another one of the rig.
+    """
+    owners = {PARAMETERS: 'the parameters'}
+    for camera in cameras:
+        name = f'{camera.replace("/", "_")}.yaml'
+        if name in owners:
+            raise SettingError(
+                f"camera '{camera}' and {owners[name]} would both be written to {name}; expected "
+                'names that differ as files'
+            )
+        owners[name] = f"camera '{camera}'"
+    return [folder / name for name in owners if name != PARAMETERS]
 
 
 def write_rig(folder: Path, calibration: TurnCalibration) -> list[Path]:
@@ -37,11 +59,13 @@ def write_rig(folder: Path, calibration: TurnCalibration) -> list[Path]:
 
     Raises
     ------
+    SettingError
+        As `camera_paths`.
     FileAccessError
         If one cannot be written.
     """
     state, cameras = calibration.fit.state, calibration.cameras
-    paths = [folder / f'{name.replace("/", "_")}.yaml' for name in cameras]
+    paths = camera_paths(folder, cameras)
     for index, (name, path) in enumerate(zip(cameras, paths, strict=True)):
         write_camera(path, Camera(name, state.lens(index, calibration.sizes[index])))
     mounts = {

@@ -99,8 +99,9 @@ def _starts(
     tracker: TurnTracker, cameras: Sequence[str], turns_right: bool | None
 ) -> list[tuple[TurnState, Sightings]]:
     """Return states to begin with, and the sightings of corners that were followed."""
-    frames, followed = tracker.frames, tracker.sightings()
+    frames = tracker.frames
     last = closing_frame(frames)
+    followed = tracker.sightings()
     firsts, links, number = [], [], followed.landmark.max() + 1
     for camera, name in enumerate(cameras):
         steps = _steps(followed.only(followed.camera == camera), len(frames))
