@@ -173,6 +173,17 @@ def test_the_expected_angle_decides(fence):
     assert overlap.offset_x_px == pytest.approx(true_px, abs=ONE_PX)
 
 
+@pytest.mark.parametrize('expected_deg', [YAW_DEG - 5, YAW_DEG, YAW_DEG + 5])
+def test_what_mounts_say_bounds_the_search_by_correlation(fence, expected_deg):
+    views, surfaces, _ = fence
+    sides = (CameraView(surface, surface) for surface in surfaces)
+    expected = Attitude(radians(expected_deg + 1))
+    pair_input = PairInput(*sides, [views], expected, radians(2.5))
+    overlap = METHODS['correlation'](pair_input, SETTINGS)
+    assert overlap.found
+    assert degrees(overlap.attitude.yaw_rad) == pytest.approx(expected_deg, abs=0.5)
+
+
 def test_an_expected_angle_without_overlap_finds_none(fence):
     views, surfaces, _ = fence
     assert not measure(views, surfaces, expected_yaw_deg=260.0).found

@@ -1,5 +1,6 @@
 """Rigs as they are mounted: levelled by what is known, drawn by mounts where nothing is found."""
 
+import re
 from dataclasses import replace
 
 import cv2
@@ -65,7 +66,12 @@ def test_a_mount_that_looks_down_gets_a_straight_horizon():
 @pytest.mark.parametrize(('expected_deg', 'found'), [(141.0, True), (120.0, False)])
 def test_an_expected_angle_is_one_about_the_vertical(expected_deg, found):
     settings = replace(SETTINGS, expected_yaw_deg=expected_deg, yaw_tolerance_deg=2.0)
-    assert measured(seen(*TILTED), settings).overlaps[0].found == found
+    (overlap,) = measured(seen(*TILTED), settings).overlaps
+    assert overlap.found == found
+    if not found:
+        angle_deg = re.search('looks (.*) degrees to the right, which', overlap.message)[1]
+        assert float(angle_deg) == pytest.approx(140, abs=YAW_DEG)
+        assert 'expected_yaw_deg of 120 and yaw_tolerance_deg of 2 forbid' in overlap.message
 
 
 def test_level_first_takes_the_first_camera_for_level():

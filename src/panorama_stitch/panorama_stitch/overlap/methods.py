@@ -1,17 +1,17 @@
 """The methods by which the overlap of two neighbours is measured, by name.
 
-Each takes what is known of a pair and gives an `Overlap`. To add one, write such a function and
-a line in `METHODS`.
+Each takes what is known of a pair and gives an `Overlap`. To add one, write such a function, a
+line in `METHODS`, and its name in those of `overlap_settings`.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import isnan, pi, radians, sqrt
+from math import degrees, isnan, pi, radians, sqrt
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fisheye_geometry.attitude import Attitude
+from fisheye_geometry.attitude import LEVEL, Attitude
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.level import levelled
 from fisheye_geometry.remap import remap_table
@@ -125,12 +125,14 @@ def by_votes(pair: PairInput, settings: OverlapSettings) -> Overlap:
         views, expected=expected, within_rad=within_rad, min_confidence=needed
     )
     attitude = Attitude.of(result.rotation.as_matrix()) if result.found else None
-    if attitude and _is_wanted(attitude, pair, settings):
+    forbidden = _forbidden(attitude, pair, settings) if attitude else ''
+    if attitude and not forbidden:
         attitude = _supported(attitude, result, settings)
         overlap = Overlap('particles', True, attitude=attitude, near_deg=result.near_deg)
         overlap = replace(overlap, message=f'{wording.direction(attitude)}, {result.message}')
     else:
-        overlap = side_by_side(pair.left.surface, 'particles', _not_found(result, needed))
+        message = forbidden or _not_found(result, needed)
+        overlap = side_by_side(pair.left.surface, 'particles', message)
     overlap = replace(overlap, confidence=result.confidence)
     images = pair.images[-1]
     corrected = pair.left.corrected(images[0]), pair.right.corrected(images[1])
@@ -157,14 +159,21 @@ def _search(pair: PairInput, settings: OverlapSettings) -> tuple[Rotation | None
     return Rotation.from_matrix(yaw.matrix), min(pi, tolerance_rad + _UNKNOWN_TILT_RAD)
 
 
-def _is_wanted(attitude: Attitude, pair: PairInput, settings: OverlapSettings) -> bool:
-    """Whether an attitude is one that the settings allow."""
-    if pair.expected is not None or isnan(settings.expected_yaw_deg):
-        return True
+def _forbidden(attitude: Attitude, pair: PairInput, settings: OverlapSettings) -> str:
+    """Return the sentence that the settings do not allow an attitude; '' where they do."""
+    expected_deg, tolerance_deg = settings.expected_yaw_deg, settings.yaw_tolerance_deg
+    if pair.expected is not None or isnan(expected_deg):
+        return ''
     # The angle is meant about the vertical, which mounts that look down alike tell.
-    yaw_rad = bearing_rad(*map(Attitude.of, levelled([np.eye(3), attitude.matrix])))
-    apart_rad = abs(yaw_rad - radians(settings.expected_yaw_deg))
-    return apart_rad <= radians(settings.yaw_tolerance_deg)
+    left, right = (Attitude.of(level) for level in levelled([np.eye(3), attitude.matrix]))
+    yaw_deg = degrees(bearing_rad(left, right))
+    if abs(yaw_deg - expected_deg) <= tolerance_deg:
+        return ''
+    return (
+        f'a common scene is seen where the right camera looks {yaw_deg:.2f} degrees to the right, '
+        f'which expected_yaw_deg of {expected_deg:g} and yaw_tolerance_deg of {tolerance_deg:g} '
+        'forbid'
+    )
 
 
 def _supported(attitude: Attitude, result, settings: OverlapSettings) -> Attitude:
@@ -178,9 +187,14 @@ def _supported(attitude: Attitude, result, settings: OverlapSettings) -> Attitud
 
 
 def by_correlation(pair: PairInput, settings: OverlapSettings) -> Overlap:
-    """Correlate the corrected images at every offset."""
-    needed = _AS_SURE * settings.min_confidence
-    settings = replace(settings, min_confidence=needed)
+    """Correlate the corrected images at every offset, or at those that are expected."""
+    settings = replace(settings, min_confidence=_AS_SURE * settings.min_confidence)
+    if pair.expected is not None:
+        settings = replace(
+            settings,
+            expected_yaw_deg=degrees(bearing_rad(LEVEL, pair.expected)),
+            yaw_tolerance_deg=degrees(pair.within_rad),
+        )
     return measure_corrected(pair.corrected(), *pair.surfaces, settings, 'correlation')
 
 

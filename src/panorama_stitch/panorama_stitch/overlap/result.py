@@ -9,7 +9,7 @@ from panorama_stitch.overlap.confidence import Evidence
 
 LIMITS = {
     '': 'the far scene agrees all over the overlap',
-    'apart': 'no common scene was found',
+    'apart': 'hardly anything far agrees',
     'few': 'the overlap shows too little to hold on to',
     'repeating': 'the scene repeats itself, and another rotation fits nearly as well',
     'depths': 'two depths compete for the far scene',
