@@ -236,6 +236,15 @@ def test_the_same_picture_twice_is_told(town):
         assert 'same picture' in measure((left, left), surfaces, method).message
 
 
+def test_what_a_corrected_image_does_not_show_stays_unseen_at_another_scale():
+    surface = surface_for(lens())
+    image = np.full((surface.height, surface.width), 90, np.uint8)
+    image[:, :100], image[200:220, 300:320] = 0, 1
+    corrected = CameraView(surface, surface.with_focal(surface.focal_px * 1.5)).corrected(image)
+    assert not corrected[:, :148].any()
+    assert corrected[:, 152:].all()
+
+
 def refused(views, surfaces):
     return measure_corrected([views], *surfaces, SETTINGS, 'correlation')
 

@@ -56,7 +56,11 @@ class CameraView:
         if self.source == self.surface:
             return grey
         table = remap_table(self.source, self.surface)
-        return np.maximum(table(grey), table.valid.astype(np.uint8))
+        seen = table.valid
+        if isinstance(self.source, Surface):
+            # Black is what its lens does not see.
+            seen = table(np.where(grey > 0, np.uint8(255), np.uint8(0))) == 255
+        return np.maximum(table(grey), seen.astype(np.uint8))
 
 
 @dataclass(frozen=True, eq=False)
