@@ -94,7 +94,9 @@ class SeamMonitor:
         None while nothing was seen. The covariance (3, 3) is of a small rotation in the left
         optical frame.
         """
-        fit = fit_far(pooled(self._votes), scan=True) if self._votes else None
+        # Another thread may look meanwhile.
+        votes = tuple(self._votes)
+        fit = fit_far(pooled(votes), scan=True) if votes else None
         if fit is None:
             return None
         rotation = Rotation.from_matrix(stepped(self._rotation, self._frame, fit.step))

@@ -5,6 +5,7 @@ import pytest
 from seeing import apart_deg, see, turned, world
 
 from panorama_stitch.overlap.monitor import SeamMonitor
+from panorama_stitch.overlap.votes import pooled
 
 YAW = 130.0
 LEFT = turned(yaw=-YAW / 2)
@@ -66,3 +67,21 @@ def test_nothing_seen_tells_nothing():
     state = SeamMonitor(IN_USE).look(dark, dark, 0.0)
     assert np.isnan(state.drift_deg)
     assert not state.drifted
+
+
+def test_a_look_from_another_thread_meanwhile_does_no_harm(monkeypatch):
+    _, monitor = drive(turned(), 2)
+
+    around = world(6)
+    views = see(around, LEFT), see(around, turned(yaw=YAW / 2))
+
+    def while_another_looks(votes):
+        seen = []
+        for one in votes:
+            seen.append(one)
+            monitor.look(*views, 2.0)
+        return pooled(seen)
+
+    monkeypatch.setattr('panorama_stitch.overlap.monitor.pooled', while_another_looks)
+    rotation, _ = monitor.sharpened()
+    assert apart_deg(rotation, IN_USE) < CLOSE_DEG
