@@ -106,6 +106,7 @@ def test_another_rig_is_refused(path, cameras, changes, sentence):
         (lambda e: e['overlaps'].reverse(), "the overlap of 'left' and 'middle' is missing"),
         (lambda e: e['overlaps'][0].update(offset_x_px='far'), "offset_x_px of .* is 'far'"),
         (lambda e: e['overlaps'][0].update(roll_deg=float('nan')), 'roll_deg of .* is nan'),
+        (lambda e: e['overlaps'][0].update(near_deg='far'), 'expected a finite number$'),
         (lambda e: e['overlaps'][1].update(found='no'), "found of .* is 'no'"),
         (lambda e: e['overlaps'][1].update(method='magic'), "method of .* is 'magic'"),
     ],

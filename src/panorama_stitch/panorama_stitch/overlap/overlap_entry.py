@@ -76,8 +76,9 @@ def overlap_of(
         value = entry.get(key)
         limit = limits.get(key, inf)
         if not is_number(value) or abs(value) > limit:
+            up_to = f' up to {limit:g}' if limit < inf else ''
             raise OverlapFileError(
-                f'{key} of {pair} is {shown(value)}; expected a finite number up to {limit:g}'
+                f'{key} of {pair} is {shown(value)}; expected a finite number{up_to}'
             )
     if type(entry.get('found')) is not bool:
         found = shown(entry.get('found'))

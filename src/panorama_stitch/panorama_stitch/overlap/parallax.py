@@ -3,7 +3,7 @@
 A vote of a near thing tells about the rotation across the direction of parallax, and nothing along
 it, but that the thing is not beyond infinity. So votes on the far side of an assumed rotation
 cost as much as false ones, and those on the near side little: the far scene wins as long as it has
-about a fifth of the votes, whatever stands in front of it.
+about a quarter of the votes, whatever stands in front of it.
 """
 
 from dataclasses import dataclass, replace
