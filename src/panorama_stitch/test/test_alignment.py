@@ -5,7 +5,7 @@ import pytest
 from scenes import exposed, pair, tilted
 
 from fisheye_geometry.attitude import Attitude
-from panorama_stitch.overlap.alignment import align, overlap_score, refine
+from panorama_stitch.overlap.alignment import align, overlap_score
 from panorama_stitch.overlap.particles import facing_halves
 from panorama_stitch.overlap.pose import Pose
 from panorama_stitch.overlap.structure import face
@@ -41,7 +41,7 @@ def test_finds_a_turn_from_an_offset_that_is_a_little_off(kind, turn):
     assert overlap_score(coarse, pose) > overlap_score(coarse, start)
 
     fine = facing_pair((left, right), surfaces, 4.0)
-    pose = refine(fine, pose.scaled(coarse.step / fine.step), tilt=True)
+    pose = align(fine, pose.scaled(coarse.step / fine.step), tilt=True, fine=True)
     assert (pose.x_px - true_px / fine.step) / fine.px_per_deg == pytest.approx(0, abs=FINE_DEG)
 
 

@@ -23,10 +23,8 @@ _STRIDE = 2
 """Every second pixel is enough to correlate two smooth pictures."""
 
 
-def align(facing: FacingPair, start: Pose, tilt: bool) -> Pose:
-    """Find the pose around an offset of a level rig.
-
-    The start stays where the overlap tells nothing better.
+def align(facing: FacingPair, start: Pose, tilt: bool, *, fine: bool = False) -> Pose:
+    """Find the pose around a start, which stays where the overlap tells nothing better.
 
     Parameters
     ----------
@@ -36,22 +34,16 @@ def align(facing: FacingPair, start: Pose, tilt: bool) -> Pose:
         Where to begin, px of these pictures.
     tilt
         Whether the right camera may be turned.
+    fine
+        Whether the start is nearly right already, and not just an offset of a level rig.
     """
-    tiles = Tiles(facing, start, _SEARCH_RAD, tilt)
-    return (
-        _checked(facing, start, tiles.climb(tiles.search()), _SEARCH_RAD) if len(tiles) else start
-    )
-
-
-def refine(facing: FacingPair, start: Pose, tilt: bool) -> Pose:
-    """Improve a pose that is nearly right already; parameters as of `align`."""
-    tiles = Tiles(facing, start, _FINE_RAD, tilt)
-    return _checked(facing, start, tiles.climb(np.zeros(4)), _FINE_RAD) if len(tiles) else start
-
-
-def _checked(facing, start, step, search_rad) -> Pose:
-    """Accept a step from the start if it is one that a rig can need."""
+    search_rad = _FINE_RAD if fine else _SEARCH_RAD
+    tiles = Tiles(facing, start, search_rad, tilt)
+    if not len(tiles):
+        return start
+    step = tiles.climb(np.zeros(4) if fine else tiles.search())
     pose = start.moved(step)
+    # No rig needs more.
     too_far = max(abs(step[:2])) > search_rad * facing.surface.focal_px
     too_steep = max(abs(pose.pitch_rad), abs(pose.roll_rad)) > _STEEPEST_RAD
     return start if too_far or too_steep else pose

@@ -6,9 +6,8 @@ by tile, and the winner is refined to a fraction of a pixel.
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import isnan, nan, radians
+from math import inf, isnan, nan, radians
 
-import cv2
 import numpy as np
 
 from fisheye_geometry.attitude import LEVEL
@@ -23,7 +22,7 @@ from panorama_stitch.overlap.overlap_result import (
 )
 from panorama_stitch.overlap.overlap_settings import OverlapSettings
 from panorama_stitch.overlap.registration import Registration, fit_at, register
-from panorama_stitch.overlap.search import Search
+from panorama_stitch.overlap.view import seen_grey_of
 
 
 def measure_corrected(
@@ -68,7 +67,7 @@ class _Measurement:
     """One pair of pictures, measured."""
 
     def __init__(self, left, right, surface_left, surface_right, settings):
-        self._left, self._right = grey_of(left), grey_of(right)
+        self._left, self._right = seen_grey_of(left), seen_grey_of(right)
         self._surfaces = surface_left, surface_right
         self._settings = settings
         self._half_start = surface_left.width - surface_left.width // 2
@@ -78,17 +77,12 @@ class _Measurement:
             return self._by_paper()
         if np.array_equal(self._left, self._right):
             message = 'both views are the same picture; is one camera used twice, or both covered?'
-            return side_by_side(self._surfaces[0], method, message)
-        search = Search(
-            x_px=self._expected(),
-            max_rise_deg=self._settings.max_rise_deg,
-            min_overlap_deg=self._settings.min_overlap_deg,
-            tilt=self._settings.correct_tilt and self._surfaces[1].yaw_is_column_shift,
-            min_confidence=self._settings.min_confidence,
+            return side_by_side(self._surfaces[0], 'correlation', message)
+        found = register(
+            self._left, self._right, *self._surfaces, self._settings, self._expected()
         )
-        found = register(self._left, self._right, *self._surfaces, search)
         if found.confidence < self._settings.min_confidence:
-            return self._not_found(method, found)
+            return self._not_found(found)
         return self._found(found)
 
     def _by_paper(self) -> Overlap:
@@ -126,7 +120,7 @@ class _Measurement:
         """Offsets of the facing halves, px, that the rig's geometry allows."""
         s = self._settings
         if isnan(s.expected_yaw_deg) or not self._surfaces[0].yaw_is_column_shift:
-            return Search.x_px
+            return -inf, inf
         left, right = self._surfaces
         first = left.center_x_px - right.center_x_px - self._half_start
         return tuple(
@@ -148,22 +142,11 @@ class _Measurement:
         rival_x_px = found.rival_x_px + self._half_start if found.distinct < 1 else nan
         return replace(overlap, message=wording.description(overlap, *self._surfaces, rival_x_px))
 
-    def _not_found(self, method, found) -> Overlap:
+    def _not_found(self, found) -> Overlap:
         needed = self._settings.min_confidence
         message = f'no common scene: confidence {found.confidence:.2f}, {needed:.2f} is needed'
         if found.rival_fit >= needed:
             offsets = found.pose.x_px + self._half_start, found.rival_x_px + self._half_start
             message = wording.repetition(*offsets, *self._surfaces)
-        aside = side_by_side(self._surfaces[0], method, message)
+        aside = side_by_side(self._surfaces[0], 'correlation', message)
         return replace(aside, confidence=found.confidence)
-
-
-def grey_of(picture: np.ndarray) -> np.ndarray:
-    """Return a grey image (height, width), still 0 exactly where nothing is seen."""
-    if picture.ndim == 2:
-        return picture
-    if picture.shape[2] == 1:
-        return picture[..., 0]
-    grey = cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
-    # A dark pixel that is seen, (1, 0, 0), must not become 0.
-    return np.maximum(grey, picture.max(axis=2) > 0)

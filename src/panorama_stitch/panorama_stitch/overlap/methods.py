@@ -18,13 +18,13 @@ from fisheye_geometry.remap import remap_table
 from fisheye_geometry.rig import bearing_rad
 from fisheye_geometry.surface import Surface
 from panorama_stitch.overlap import wording
-from panorama_stitch.overlap.corrected_overlap import grey_of, measure_corrected
+from panorama_stitch.overlap.corrected_overlap import measure_corrected
 from panorama_stitch.overlap.measure import measure_rotation
 from panorama_stitch.overlap.overlap_result import Overlap, side_by_side
 from panorama_stitch.overlap.overlap_settings import OverlapSettings
 from panorama_stitch.overlap.reported_particles import with_particles
 from panorama_stitch.overlap.result import LIMITS, RotationResult
-from panorama_stitch.overlap.view import OverlapView
+from panorama_stitch.overlap.view import OverlapView, seen_grey_of
 
 _UNKNOWN_TILT_RAD = radians(50.0)
 """Two cameras that each look up or down by 25 degrees differ by so much."""
@@ -52,7 +52,7 @@ class CameraView:
 
     def corrected(self, image: np.ndarray) -> np.ndarray:
         """Correct an image to grey, (height, width) uint8; 0 exactly where nothing is seen."""
-        grey = grey_of(image)
+        grey = seen_grey_of(image)
         if self.source == self.surface:
             return grey
         table = remap_table(self.source, self.surface)

@@ -8,11 +8,11 @@ from operator import itemgetter
 import numpy as np
 
 from fisheye_geometry.surface import Surface
-from panorama_stitch.overlap.alignment import align, overlap_score, refine
+from panorama_stitch.overlap.alignment import align, overlap_score
 from panorama_stitch.overlap.correlation import ScoreMap, correlate
+from panorama_stitch.overlap.overlap_settings import OverlapSettings
 from panorama_stitch.overlap.particles import facing_halves
 from panorama_stitch.overlap.pose import Pose
-from panorama_stitch.overlap.search import Search
 from panorama_stitch.overlap.structure import FacingPair, face
 
 _SEARCH_PX_PER_DEG, _FINE_PX_PER_DEG = 2.0, 4.0
@@ -69,7 +69,8 @@ def register(
     right: np.ndarray,
     surface_left: Surface,
     surface_right: Surface,
-    search: Search,
+    settings: OverlapSettings,
+    x_px: tuple[float, float],
 ) -> Registration:
     """Find where the facing halves of two grey pictures overlap.
 
@@ -79,8 +80,10 @@ def register(
         (height, width) uint8, 0 where nothing is seen.
     surface_left, surface_right
         What they show.
-    search
-        Where to look.
+    settings
+        How far to look, for what confidence, and whether the right camera may be turned.
+    x_px
+        Smallest and largest offset of the right half in the left one.
 
     Returns
     -------
@@ -90,14 +93,15 @@ def register(
     left, right = facing_halves(left, right)
     level_y_px = surface_left.center_y_px - surface_right.center_y_px
     facing = face(left, right, surface_right, level_y_px, _SEARCH_PX_PER_DEG)
-    landscape = _explore(facing, search)
+    tilt = settings.correct_tilt and surface_right.yaw_is_column_shift
+    landscape = _explore(facing, settings, x_px)
     if landscape is None:
         return Registration(Pose(0.0, 0.0))
     offsets = landscape.peaks(_CANDIDATES, round(_APART_DEG * facing.px_per_deg))
-    best = _verify(facing, landscape, offsets, search.tilt)
+    best = _verify(facing, landscape, offsets, tilt)
     pose = best.pose.scaled(facing.step)
-    if best.confidence >= search.min_confidence:
-        pose = _refine(left, right, surface_right, level_y_px, pose, search.tilt)
+    if best.confidence >= settings.min_confidence:
+        pose = _refine(left, right, surface_right, level_y_px, pose, tilt)
     return replace(best, pose=pose, rival_x_px=best.rival_x_px * facing.step)
 
 
@@ -123,26 +127,28 @@ def _refine(left, right, surface_right, level_y_px, pose, tilt) -> Pose:
     left, right = left[:, start:], right[:, : left.shape[1] - round(pose.x_px) + margin]
     facing = face(left, right, surface_right, level_y_px, _FINE_PX_PER_DEG)
     begin = replace(pose, x_px=pose.x_px - start).scaled(1 / facing.step)
-    pose = _level_if_as_good(facing, refine(facing, begin, tilt)).scaled(facing.step)
+    pose = _level_if_as_good(facing, align(facing, begin, tilt, fine=True)).scaled(facing.step)
     return replace(pose, x_px=pose.x_px + start)
 
 
 def _level_if_as_good(facing: FacingPair, pose: Pose) -> Pose:
     """Leave out a tilt that closes the seam no better than none: noise alone would make one."""
     start = replace(pose, y_px=facing.level_y_px, pitch_rad=0.0, roll_rad=0.0)
-    level = refine(facing, start, False)
+    level = align(facing, start, False, fine=True)
     as_good = overlap_score(facing, level) >= overlap_score(facing, pose) - _AS_GOOD
     return level if as_good else pose
 
 
-def _explore(facing: FacingPair, search: Search) -> ScoreMap | None:
+def _explore(
+    facing: FacingPair, settings: OverlapSettings, x_px: tuple[float, float]
+) -> ScoreMap | None:
     """Score all offsets that may be; None where there are none."""
-    narrowest = round(search.min_overlap_deg * facing.px_per_deg)
+    narrowest = round(settings.min_overlap_deg * facing.px_per_deg)
     # One row more on either side tells a peak from a slope that goes on.
-    rise = round(search.max_rise_deg * facing.px_per_deg) + 1
+    rise = round(settings.max_rise_deg * facing.px_per_deg) + 1
     level = round(facing.level_y_px)
     width, right_width = facing.left.image.shape[1], facing.right.image.shape[1]
-    low, high = (int(np.clip(x / facing.step, -1e6, 1e6)) for x in search.x_px)
+    low, high = (int(np.clip(x / facing.step, -1e6, 1e6)) for x in x_px)
     x = range(max(narrowest - right_width, low), min(width - narrowest, high) + 1)
     if not x:
         return None

@@ -117,7 +117,5 @@ def _common(left, right, frame, rotation, usable):
     ranges = []
     for angles, axis in ((u, 0), (v, 1)):
         inside = angles[seen.any(axis=axis)]
-        ranges.append(
-            (max(inside[0] - step, angles[0]), min(inside[-1] + step, angles[-1] + step))
-        )
+        ranges.append((max(inside[0] - step, angles[0]), inside[-1] + step))
     return ranges

@@ -15,6 +15,24 @@ _HOLE_PX = 7
 """Black spots smaller than it are dark pixels, not the outside of the image circle."""
 
 
+def grey_of(image: np.ndarray) -> np.ndarray:
+    """Return the grey levels (height, width) of a grey or BGR image."""
+    if image.ndim == 2:
+        return image
+    if image.shape[2] == 1:
+        return image[..., 0]
+    return cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+
+
+def seen_grey_of(image: np.ndarray) -> np.ndarray:
+    """Return the same of a corrected image, still 0 exactly where nothing is seen."""
+    grey = grey_of(image)
+    if image.ndim == 2:
+        return grey
+    # A dark pixel that is seen, (1, 0, 0), must not become 0.
+    return np.maximum(grey, image.max(axis=2) > 0)
+
+
 @dataclass(frozen=True, eq=False)
 class OverlapView:
     """An image with its camera model.
@@ -36,11 +54,7 @@ class OverlapView:
     @cached_property
     def grey(self) -> np.ndarray:
         """(height, width) uint8."""
-        if self.image.ndim == 2:
-            return self.image
-        if self.image.shape[2] == 1:
-            return self.image[..., 0]
-        return cv2.cvtColor(self.image, cv2.COLOR_BGR2GRAY)
+        return grey_of(self.image)
 
     @cached_property
     def usable(self) -> np.ndarray:

@@ -23,10 +23,8 @@ def description(overlap: Overlap, left: Surface, right: Surface, rival_x_px: flo
         A second offset that is nearly as good; NaN if there is none.
     """
     parts = [f'the right view begins at {place(overlap.offset_x_px, left, right)}']
-    tilt = overlap.attitude or LEVEL
-    pitch, roll = degrees(tilt.pitch_rad), degrees(tilt.roll_rad)
-    if max(abs(pitch), abs(roll)) >= _SHOWN_DEG:
-        parts.append(f'its camera pitched by {pitch:.2f} and rolled by {roll:.2f} degrees')
+    if tilt := _tilt(overlap.attitude or LEVEL):
+        parts.append(f'its camera {tilt}')
     parts.append(f'confidence {overlap.confidence:.2f}')
     if not isnan(rival_x_px):
         parts.append(f'though {place(rival_x_px, left, right)} fits nearly as well')
@@ -52,7 +50,12 @@ def place(offset_x_px: float, left: Surface, right: Surface) -> str:
 def direction(attitude: Attitude) -> str:
     """Describe where the right camera looks in the frame of the left one."""
     words = f'the right camera looks {degrees(attitude.yaw_rad):.2f} degrees to the right'
+    return ', '.join(filter(None, (words, _tilt(attitude))))
+
+
+def _tilt(attitude: Attitude) -> str:
+    """Describe pitch and roll; '' where there is none that a person would see."""
     pitch, roll = degrees(attitude.pitch_rad), degrees(attitude.roll_rad)
-    if max(abs(pitch), abs(roll)) >= _SHOWN_DEG:
-        words += f', pitched by {pitch:.2f} and rolled by {roll:.2f} degrees'
-    return words
+    if max(abs(pitch), abs(roll)) < _SHOWN_DEG:
+        return ''
+    return f'pitched by {pitch:.2f} and rolled by {roll:.2f} degrees'
