@@ -114,7 +114,7 @@ def test_other_machines_need_https_for_h264(browser, serve, is_encrypted, tmp_pa
     assert format_of(page) == expected
 
 
-class Relay:
+class PoorLink:
     """A way to a port that can become slow, or silent without a word to either end."""
 
     def __init__(self, port):
@@ -167,7 +167,7 @@ class Relay:
 
 def test_the_page_comes_back_by_itself_when_its_link_was_silent(browser, serve):
     server = serve(SURFACES[0], painted(SURFACES[0], 0, 0))
-    with closing(Relay(urlsplit(server.url).port)) as relay:
+    with closing(PoorLink(urlsplit(server.url).port)) as relay:
         page = Page(browser, f'http://127.0.0.1:{relay.port}/')
         page.until(lambda: page.text('condition') == 'Live', 'a live picture')
         relay.cut()
@@ -195,7 +195,7 @@ def test_a_slow_link_shows_fewer_pictures(browser, serve, before_the_page):
         server.tell(delay_ms=20 + time.monotonic() % 1)  # the viewer tells it twice a second
         return browser.execute_script('return window.drawn')
 
-    with closing(Relay(urlsplit(server.url).port)) as relay:
+    with closing(PoorLink(urlsplit(server.url).port)) as relay:
         page = Page(browser, f'http://127.0.0.1:{relay.port}/')
         page.until(lambda: page.text('condition') == 'Live', 'a live picture')
         jpeg = cv2.imencode('.jpg', noise, (cv2.IMWRITE_JPEG_QUALITY, 95))[1]

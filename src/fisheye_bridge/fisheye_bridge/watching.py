@@ -7,7 +7,7 @@ from time import monotonic
 from typing import Any, TypeVar
 
 import rclpy
-from rclpy.exceptions import InvalidTopicNameException
+from rclpy.exceptions import InvalidTopicNameException, ParameterException
 from rclpy.node import Node
 
 from fisheye_bridge.running import begin
@@ -34,7 +34,7 @@ def watch(see: Callable[[_Node], None], node_class: type[_Node], *arguments: Any
     Raises
     ------
     SettingError
-        If the name of a topic is not possible.
+        If the name of a topic is not possible, or as of `started`.
     """
     try:
         with started(node_class, *arguments) as node:
@@ -57,11 +57,19 @@ def started(node_class: type[_Node], *arguments: Any) -> Iterator[_Node]:
     ----------
     node_class, *arguments
         What to build, of what.
+
+    Raises
+    ------
+    SettingError
+        If the environment or a parameter of ROS does not let it start.
     """
     node = None
     try:
-        begin(node_class)
-        node = node_class(*arguments)
+        try:
+            begin(node_class)
+            node = node_class(*arguments)
+        except (ParameterException, rclpy._rclpy_pybind11.RCLError) as error:
+            raise SettingError(str(error)) from error
         yield node
     finally:
         if node:

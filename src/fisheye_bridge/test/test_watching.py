@@ -32,3 +32,10 @@ def test_a_name_that_no_topic_has_is_told():
     with pytest.raises(SettingError, match=r"^the topic '/no topic' is not possible: .*[^:]$"):
         watch(lambda node: None, TopicWatcher, '/no topic')
     assert not rclpy.ok()
+
+
+def test_an_environment_that_ros_refuses_is_a_sentence(monkeypatch):
+    monkeypatch.setenv('ROS_DOMAIN_ID', 'abc')
+    with pytest.raises(SettingError, match='ROS_DOMAIN_ID is not an integral number'):
+        watch(lambda node: None, TopicWatcher, '/watching_test/image')
+    assert not rclpy.ok()
