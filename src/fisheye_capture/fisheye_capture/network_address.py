@@ -95,5 +95,19 @@ def refusal(request: StreamRequest, error: Exception) -> str:
         return f'{shown} cannot be found; is the name of the host right?'
     if code == errno.EINVAL:
         return f'{shown} leads to what a camera may not lead to, or its address has a mistake'
-    words = getattr(error, 'strerror', None) or type(error).__name__
-    return f'{shown} cannot be opened: {words}'
+    return f'{shown} cannot be opened: {_words(error)}'
+
+
+def loss(request: StreamRequest, error: Exception) -> str:
+    """Explain in a sentence why a camera that was open sends nothing any more."""
+    if isinstance(error, (av.error.ExitError, av.error.TimeoutError)):
+        reason = f'nothing came for {request.silence_s:g} s'
+    elif getattr(error, 'errno', None) == errno.EIO:
+        reason = 'the connection broke off'
+    else:
+        reason = _words(error)
+    return f'{request.shown} stopped sending pictures: {reason}'
+
+
+def _words(error: Exception) -> str:
+    return getattr(error, 'strerror', None) or type(error).__name__

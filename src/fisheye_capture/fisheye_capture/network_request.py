@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 
 SCHEMES = ('http', 'https', 'rtsp', 'rtsps', 'udp')
+_SLOW_PERIODS = 3
+"""Of a camera, without anything, before it counts as lost."""
 
 
 @dataclass(frozen=True)
@@ -29,3 +31,8 @@ class StreamRequest:
     def scheme(self) -> str:
         """Of the URL, in small letters."""
         return self.url.partition('://')[0].lower()
+
+    @property
+    def silence_s(self) -> float:
+        """How long it may send nothing before it counts as lost."""
+        return max(self.silence_timeout_s, _SLOW_PERIODS / self.frame_rate_hz)

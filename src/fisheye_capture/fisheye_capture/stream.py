@@ -59,7 +59,7 @@ class StreamSource(Source):
             self._channel.close()
             raise SourceLostError(f'no process can read the stream: {error.strerror}') from error
         # Not as arguments: they are for everybody to see, and a URL may hold a password.
-        send(self._channel, asdict(_request(settings)))
+        send(self._channel, asdict(request_of(settings)))
 
     def read(self) -> Frame | JpegFrame:
         """Wait for a picture that came after the one before; the newest if there are more."""
@@ -120,7 +120,7 @@ class StreamSource(Source):
             return None
 
 
-def _request(settings: CaptureSettings) -> StreamRequest:
+def request_of(settings: CaptureSettings) -> StreamRequest:
     """Return what to ask for a camera of these settings."""
     return StreamRequest(
         url=_quoted(settings.source),

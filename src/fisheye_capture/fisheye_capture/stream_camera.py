@@ -9,7 +9,7 @@ from typing import Any
 
 import av
 
-from fisheye_capture.network_address import StreamError, open_camera, refusal
+from fisheye_capture.network_address import StreamError, loss, open_camera
 from fisheye_capture.network_request import StreamRequest
 from fisheye_capture.packets import Arrival, packet_reader
 from fisheye_core.picture_decoder import PictureDecoder
@@ -18,8 +18,6 @@ _BACKLOG_NS = 300_000_000
 """So far behind, the decoder goes on at the newest keyframe."""
 _KEYFRAME_S = 4.0
 """Without a picture for so long, what is missing is said."""
-_SLOW_PERIODS = 3
-"""Of a camera, without anything, before it counts as lost."""
 _MAX_STAMPS = 100
 """Of pictures that a decoder may hold back."""
 
@@ -95,7 +93,7 @@ class StreamCamera:
 
     def _check_silence(self):
         request, now_s = self._request, time.monotonic()
-        silence_s = max(request.silence_timeout_s, _SLOW_PERIODS / request.frame_rate_hz)
+        silence_s = request.silence_s
         if now_s - self._heard_s > silence_s:
             raise StreamError(
                 f'{request.shown} stopped sending pictures: nothing came for {silence_s:g} s'
@@ -117,7 +115,7 @@ class StreamCamera:
         except StreamError as error:
             reason = str(error)
         except (av.error.FFmpegError, OSError) as error:
-            reason = refusal(self._request, error)
+            reason = loss(self._request, error)
         with self._changed:
             self._end = self._end or reason
             self._changed.notify_all()

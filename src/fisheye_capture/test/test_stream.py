@@ -1,11 +1,14 @@
 """Network streams, from a real HTTP camera."""
 
+import errno
 import time
 from threading import Thread
 
+import av
 import pytest
 
 from fisheye_capture import stream
+from fisheye_capture.network_address import loss
 from fisheye_capture.source import SourceLostError
 from fisheye_capture.stream import StreamSource
 from fisheye_core.errors import SourceError
@@ -64,6 +67,30 @@ def test_a_camera_that_falls_silent_is_lost(camera, open_stream):
     with pytest.raises(SourceLostError, match='stopped sending pictures'):
         while True:
             source.read()
+
+
+def test_a_connection_that_breaks_off_is_said(camera, open_stream):
+    source = open_stream(camera.url)
+    source.read()
+    camera.stop()
+    # Whether that is an end or an error depends on the version of FFmpeg.
+    said = 'the connection broke off|it ended the stream'
+    with pytest.raises(SourceLostError, match=f'/stream stopped sending pictures: ({said})$'):
+        while True:
+            source.read()
+
+
+@pytest.mark.parametrize(
+    ('error', 'reason'),
+    [
+        (OSError(errno.EIO, 'Input/output error'), 'the connection broke off'),
+        (ConnectionResetError(errno.ECONNRESET, 'Reset by peer'), 'Reset by peer'),
+        (av.error.ExitError(0, 'Immediate exit'), 'nothing came for 3 s'),
+    ],
+)
+def test_what_ends_a_camera_that_ran_is_said(settings, error, reason):
+    request = stream.request_of(settings('http://camera/stream', frame_rate_hz=1.0))
+    assert loss(request, error) == f'http://camera/stream stopped sending pictures: {reason}'
 
 
 def test_a_read_that_waits_ends_at_once_when_interrupted(camera, open_stream):
