@@ -52,7 +52,7 @@ def open_camera(request: StreamRequest) -> Opened:
     if request.scheme == 'udp':
         # A transport stream packs a picture in a packet: to look for its end costs another one.
         options |= {'fflags': 'noparse+nofillin', 'fifo_size': '100000', 'overrun_nonfatal': '1'}
-    timeout_s = request.connect_timeout_s, max(request.connect_timeout_s, 1.0)
+    timeout_s = request.connect_timeout_s, max(request.connect_timeout_s, request.silence_s, 1.0)
     try:
         with ffmpeg_log.captured() as said:
             container = av.open(request.url, options=options, timeout=timeout_s)

@@ -69,6 +69,17 @@ def test_a_camera_that_falls_silent_is_lost(camera, open_stream):
             source.read()
 
 
+def test_a_camera_may_pause_for_longer_than_it_may_take_to_answer(camera, open_stream):
+    source = open_stream(camera.url, connect_timeout_s=1.0, silence_timeout_s=60.0)
+    source.read()
+    camera.stalled.set()
+    time.sleep(2.5)
+    camera.stalled.clear()
+    paused_ns = time.time_ns()
+    while source.read().stamp_ns < paused_ns:
+        pass
+
+
 def test_a_connection_that_breaks_off_is_said(camera, open_stream):
     source = open_stream(camera.url)
     source.read()
