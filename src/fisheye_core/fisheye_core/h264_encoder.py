@@ -22,12 +22,21 @@ from fisheye_core.video_settings import ENCODERS
 
 _USUAL_HZ = 30.0
 _PIXELS_OF_A_THREAD = 1_000_000
-_RATE, _BUFFER_S = 0.85, 0.2
-"""Shares of the cap: in no second more than their sum, as a full buffer adds to the rate."""
+_NEVER = 60_000
+"""Pictures between two keyframes of an encoder that is asked for each of them."""
+_RATE, _MOST = 0.85, 1.05
+"""Shares of the cap: in no second more than the latter, as a full buffer adds to the rate."""
 _COMMON = {'colorspace': 'smpte170m', 'color_range': 'tv'}
 _OPTIONS = {
     'libx264': {'preset': 'superfast', 'tune': 'zerolatency', 'crf': '22', 'forced-idr': '1'},
-    'h264_nvenc': {'preset': 'p2', 'tune': 'ull', 'delay': '0', 'zerolatency': '1', 'rc': 'cbr'},
+    'h264_nvenc': {
+        'preset': 'p2',
+        'tune': 'ull',
+        'delay': '0',
+        'zerolatency': '1',
+        'rc': 'cbr',
+        'forced-idr': '1',
+    },
     'h264_v4l2m2m': {},
     'h264_vaapi': {'async_depth': '1', 'rc_mode': 'CBR'},
 }
@@ -67,9 +76,9 @@ class H264Encoder:
         names = ENCODERS[1:] if encoder == 'auto' else dict.fromkeys((encoder, ENCODERS[-1]))
         self._candidates, self._asked = list(names), encoder
         self._context: VideoCodecContext | None = None
-        self._opened: tuple[int, int, int, float] = 0, 0, 0, 0.0
+        self._opened: tuple[int, int, int, bool] = 0, 0, 0, False
         self._rate, self._count = PictureRate(_USUAL_HZ), 0
-        self._is_keyframe_wanted = False
+        self._is_keyframe_wanted, self._keyframe_s = False, 0.0
         self._parameter_sets = b''
 
     def request_keyframe(self) -> None:
@@ -100,13 +109,26 @@ class H264Encoder:
         """
         planes = to_planes(image, encoding)
         height, width = planes.shape[0] * 2 // 3, planes.shape[1]
-        has_new_rate = self._rate.changed(time.monotonic() if now_s is None else now_s)
-        wanted = width, height, self.bitrate_kbps, self.keyframe_s
+        now_s = time.monotonic() if now_s is None else now_s
+        has_new_rate = self._rate.changed(now_s)
+        if self.keyframe_s:
+            # The picture that is nearest to the time: no two are exactly a period apart.
+            due_s = self._keyframe_s + self.keyframe_s - 0.5 / self._rate.hz
+            if now_s > due_s:
+                self.request_keyframe()
+        wanted = width, height, self.bitrate_kbps, self.keyframe_s == 0
         if self._context is None or has_new_rate or self._opened != wanted:
             self._opened = wanted
-            return self._begin(planes)
+            picture = self._begin(planes)
+        else:
+            picture = self._next(planes, self._context)
+        if picture.is_keyframe:
+            self._keyframe_s = now_s
+        return picture
+
+    def _next(self, planes: np.ndarray, context: VideoCodecContext) -> EncodedPicture:
         with suppress(FFmpegError):
-            if picture := self._encoded(planes, self._context):
+            if picture := self._encoded(planes, context):
                 return picture
         # Hardware may fail at any time; without it the stream goes on.
         fault = f'{self.name} stopped working'
@@ -141,7 +163,7 @@ class H264Encoder:
         return picture
 
     def _open(self, name: str) -> VideoCodecContext:
-        width, height, bitrate_kbps, keyframe_s = self._opened
+        width, height, bitrate_kbps, is_rolling = self._opened
         context = av.CodecContext.create(name, 'w')
         context.width, context.height, context.pix_fmt = width, height, 'yuv420p'
         hz = Fraction(self._rate.hz).limit_denominator(1000)
@@ -149,12 +171,14 @@ class H264Encoder:
         context.thread_type = 'SLICE'
         threads = width * height // _PIXELS_OF_A_THREAD + 1
         context.thread_count = min(threads, os.cpu_count() or 1)
-        interval = max(1, round(hz * keyframe_s or hz))
-        rate, buffer = (round(share * 1000 * bitrate_kbps) for share in (_RATE, _BUFFER_S))
+        interval = max(1, round(hz)) if is_rolling else _NEVER
+        # The buffer holds one picture at least, which of a slow stream is much of a second.
+        share = min(_RATE, _MOST * self._rate.hz / (self._rate.hz + 1))
+        rate, buffer = (round(s * 1000 * bitrate_kbps) for s in (share, _MOST - share))
         options = {**_COMMON, **_OPTIONS[name], 'g': f'{interval}', 'bf': '0'}
         options |= {'b': f'{rate}', 'maxrate': f'{rate}', 'bufsize': f'{buffer}'}
         if name == 'libx264':
-            options['x264-params'] = f'scenecut=0:intra-refresh={int(keyframe_s == 0)}'
+            options['x264-params'] = f'scenecut=0:intra-refresh={is_rolling:d}'
         context.options = options
         context.open()
         return context

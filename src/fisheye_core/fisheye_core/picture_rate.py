@@ -6,8 +6,10 @@ _PICTURES, _FEW = 11, 5
 _FASTER, _SLOWER = 1.15, 0.6
 _MUCH_FASTER = 1.6
 """Of few pictures: a jump is followed before much was sent at the old share."""
-_PAUSE_S = 1.0
-"""After a pause, counting begins anew."""
+_PAUSE_S, _PAUSE_PERIODS = 1.0, 3
+"""What is longer than both is a pause, after which counting begins anew."""
+_LONGEST_PERIOD_S = 10.0
+"""Of the slowest cameras."""
 
 
 class PictureRate:
@@ -26,7 +28,10 @@ class PictureRate:
     def changed(self, now_s: float) -> bool:
         """Count a picture that comes at a time; return whether the nominal rate is now another."""
         times_s = self._times_s
-        if times_s and not 0 < now_s - times_s[-1] < _PAUSE_S:
+        period_s = _LONGEST_PERIOD_S  # the first may be any
+        if len(times_s) > 1:
+            period_s = min(period_s, times_s[-1] - times_s[-2])
+        if times_s and not 0 < now_s - times_s[-1] < max(_PAUSE_S, _PAUSE_PERIODS * period_s):
             times_s.clear()
         times_s.append(now_s)
         if len(times_s) < _FEW:

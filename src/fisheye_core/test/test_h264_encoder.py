@@ -77,6 +77,19 @@ def test_keyframes_come_in_time_with_their_parameter_sets_and_no_picture_waits_f
     assert kinds == {PictureType.I, PictureType.P}
 
 
+@pytest.mark.parametrize(
+    ('hz', 'keyframe_s', 'every'),
+    [(20.0, 1.0, 20), (34.0, 1.0, 34), (2.0, 1.0, 2), (0.2, 10.0, 2)],
+)
+def test_keyframes_come_in_time_at_any_rate(encoder, hz, keyframe_s, every):
+    encoder.keyframe_s = keyframe_s
+    # After some more pictures a slow rate is noticed, and begins with a keyframe.
+    count = 2 * every + 5
+    packets = [encoded for _, encoded in stream(encoder, moving_pictures(count), hz)]
+    keyframes = [number for number, p in enumerate(packets) if p.is_keyframe]
+    assert keyframes == list(range(0, count, every))
+
+
 def test_without_keyframes_the_picture_is_renewed_in_parts(encoder):
     encoder.keyframe_s, encoder.bitrate_kbps = 0.0, PLENTY_KBPS
     packets = [encoded for _, encoded in stream(encoder, moving_pictures(75))]
@@ -101,6 +114,12 @@ def test_no_second_holds_more_than_the_cap(encoder, keyframe_s, hz, pictures):
     # The rate is noticed after some pictures, which are as large as at the usual one.
     settled = [(now_s, packet) for now_s, packet in packets if now_s > 0.5 or hz == HZ]
     assert most_kbps(settled) < EXCESS * CAP_KBPS
+
+
+@pytest.mark.parametrize('hz', [0.1, 1.2])
+def test_pictures_of_slow_streams_are_large_but_no_second_holds_more_than_the_cap(encoder, hz):
+    settled = stream(encoder, noise_pictures(20), hz)[11:]
+    assert 0.5 * CAP_KBPS < most_kbps(settled) < EXCESS * CAP_KBPS
 
 
 def test_keyframes_that_are_asked_for_again_and_again_stay_within_the_cap(encoder):

@@ -30,6 +30,12 @@ def test_another_rate_is_found(hz):
     assert rates([hz], 4)[-1] == pytest.approx(hz, rel=TOLERANCE - 1)
 
 
+@pytest.mark.parametrize('hz', [0.1, 1.0])
+def test_the_rate_of_slow_pictures_is_found(hz):
+    assert rates([hz], round(13 / hz))[-1] == pytest.approx(hz, rel=TOLERANCE - 1)
+    assert rates([hz], round(40 / hz), jitter=0.3)[-1] == pytest.approx(hz, rel=0.5)
+
+
 def test_a_jump_is_followed_within_a_second():
     after = rates([10.0, 10.0, 10.0, 60.0], 4)
     assert after[2] == pytest.approx(10.0, rel=TOLERANCE - 1)
