@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 
 SCHEMES = ('http', 'https', 'rtsp', 'rtsps', 'udp')
+MAX_DIFFERENCE_NS = 5_000_000_000
+"""Between the camera's clock and that of this machine, where stamps are by the former."""
 _SLOW_PERIODS = 3
 """Of a camera, without anything, before it counts as lost."""
 

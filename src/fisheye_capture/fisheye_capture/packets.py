@@ -9,7 +9,7 @@ import av
 
 from fisheye_capture.arrival import ArrivalClock
 from fisheye_capture.network_address import Opened, open_camera, tells_of_loss
-from fisheye_capture.network_request import StreamRequest
+from fisheye_capture.network_request import MAX_DIFFERENCE_NS, StreamRequest
 from fisheye_core import ffmpeg_log
 
 _BURST_S = 0.003
@@ -17,8 +17,6 @@ _BURST_S = 0.003
 _LONGEST_BURST_S = 2.0
 _LATE = {('rtsp', False): 1, ('mpegts', True): 1, ('mpegts', False): 2}
 """Pictures that FFmpeg waits for until it gives one, by container and whether that is UDP."""
-_MAX_DIFFERENCE_NS = 5_000_000_000
-"""Between the camera's clock and that of this machine."""
 _NS_PER_S = 1_000_000_000
 
 
@@ -79,7 +77,7 @@ class PacketReader:
 
     def _stamp_ns(self, packet, arrival_ns):
         if self._request.stamp_from == 'camera' and (taken_ns := _camera_ns(packet)):
-            if abs(arrival_ns - taken_ns) < _MAX_DIFFERENCE_NS:
+            if abs(arrival_ns - taken_ns) < MAX_DIFFERENCE_NS:
                 return taken_ns
             self.note = (
                 f'the clock of {self._request.shown} is {(taken_ns - arrival_ns) / 1e9:+.1f} s '
@@ -101,7 +99,7 @@ class PlaylistReader(PacketReader):
         for arrival in super().read():
             packet = arrival.packet
             media_ns, now_ns = _media_ns(packet) or 0, time.time_ns()
-            if start_ns is None or abs(start_ns + media_ns - now_ns) > _MAX_DIFFERENCE_NS:
+            if start_ns is None or abs(start_ns + media_ns - now_ns) > MAX_DIFFERENCE_NS:
                 start_ns = now_ns - media_ns
             time.sleep(max(0, start_ns + media_ns - now_ns) / _NS_PER_S)
             yield Arrival(packet, time.time_ns())

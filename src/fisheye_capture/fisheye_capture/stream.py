@@ -17,7 +17,7 @@ from urllib.parse import quote
 
 from fisheye_capture.capture_settings import CaptureSettings
 from fisheye_capture.device import BROKEN_IN_A_ROW, check_size, jpeg_frame
-from fisheye_capture.network_request import StreamRequest
+from fisheye_capture.network_request import MAX_DIFFERENCE_NS, StreamRequest
 from fisheye_capture.shared_frames import SlotPool, receive, send
 from fisheye_capture.source import (
     CREDENTIALS,
@@ -65,8 +65,11 @@ class StreamSource(Source):
         """Wait for a picture that came after the one before; the newest if there are more."""
         for _ in range(BROKEN_IN_A_ROW):
             message, array = self._fetch()
-            # A sender report may set the camera's clock right, but no stamp goes back.
-            stamp_ns = max(message['stamp_ns'] - self._delay_ns, self._last_ns + 1)
+            stamp_ns = message['stamp_ns'] - self._delay_ns
+            # A sender report may set the camera's clock right, but no stamp goes back; only where
+            # this machine's clock was set back, stamps follow it.
+            if 0 <= self._last_ns - stamp_ns < MAX_DIFFERENCE_NS:
+                stamp_ns = self._last_ns + 1
             frame = self._frame(stamp_ns, message['shape'], array)
             self.skipped = message['skipped']
             self.damaged = message['damaged'] + self._torn

@@ -48,6 +48,23 @@ def test_frames_come_with_the_time_at_which_they_came(camera, open_stream, encod
     assert before_ns < first.stamp_ns < second.stamp_ns <= time.time_ns()
 
 
+def test_stamps_go_back_only_with_the_clock_of_this_machine(camera, open_stream, monkeypatch):
+    source, receive, back_ns = open_stream(camera.url), stream.receive, 0
+
+    def receive_set_back(channel):
+        message, files = receive(channel)
+        if 'stamp_ns' in message:
+            message['stamp_ns'] -= back_ns
+        return message, files
+
+    monkeypatch.setattr(stream, 'receive', receive_set_back)
+    first_ns, back_ns = source.read().stamp_ns, 4_000_000_000
+    assert source.read().stamp_ns == first_ns + 1
+    back_ns = 3_600_000_000_000
+    second_ns, third_ns = source.read().stamp_ns, source.read().stamp_ns
+    assert second_ns < third_ns < first_ns
+
+
 def test_without_pyav_it_is_said_what_to_install(open_stream, monkeypatch):
     monkeypatch.setattr(stream.importlib.util, 'find_spec', lambda name: None)
     with pytest.raises(SourceError, match='sudo apt install python3-av, or pip install av'):
