@@ -16,7 +16,7 @@ class StreamRequest:
     Attributes
     ----------
     url, shown
-        Its address, and the same as others may read it.
+        Its address, its scheme in small letters, and the address as others may read it.
     """
 
     url: str
@@ -31,8 +31,8 @@ class StreamRequest:
 
     @property
     def scheme(self) -> str:
-        """Of the URL, in small letters."""
-        return self.url.partition('://')[0].lower()
+        """Of the URL."""
+        return self.url.partition('://')[0]
 
     @property
     def silence_s(self) -> float:

@@ -125,8 +125,10 @@ class StreamSource(Source):
 
 def request_of(settings: CaptureSettings) -> StreamRequest:
     """Return what to ask for a camera of these settings."""
+    scheme, mark, rest = settings.source.partition('://')
     return StreamRequest(
-        url=_quoted(settings.source),
+        # FFmpeg knows protocols in small letters only.
+        url=_quoted(scheme.lower() + mark + rest),
         shown=shown_source(settings.source),
         encoding=settings.encoding,
         frame_rate_hz=settings.frame_rate_hz,

@@ -48,6 +48,11 @@ def test_frames_come_with_the_time_at_which_they_came(camera, open_stream, encod
     assert before_ns < first.stamp_ns < second.stamp_ns <= time.time_ns()
 
 
+def test_a_scheme_may_be_in_capitals(camera, open_stream):
+    source = open_stream(camera.url.replace('http', 'HTTP'))
+    assert source.read().size == (64, 48)
+
+
 def test_stamps_go_back_only_with_the_clock_of_this_machine(camera, open_stream, monkeypatch):
     source, receive, back_ns = open_stream(camera.url), stream.receive, 0
 
