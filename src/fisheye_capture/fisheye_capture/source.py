@@ -100,9 +100,12 @@ class Source(ABC):
 
 CREDENTIALS = (
     r'^(?P<scheme>[A-Za-z][\w+.-]*:/{1,3}|(?![A-Za-z][\w+.-]*:/))'
-    r'(?P<login>[^/@:?]*:.*|[^/@:?]*)@'
+    r'(?P<login>(?!\[[\da-fA-F:.]+\])[^/@:?]*:(?!\d{1,5}[/?]).*|[^/@:?]*)@'
 )
-"""User and password at the start of a URL; a password may hold any letter, / and @ too."""
+"""User and password at the start of a URL; a password may hold any letter, / and @ too.
+
+What looks like a port and a path, or an IPv6 address, is none: an @ may stand further on.
+"""
 _SECRETS = re.compile(
     '((?:user|usr|login|account|pass|pwd|pw|token|key|auth|secret|session|sid|credential)'
     r'[^=&?/;]{0,16}=)[^&;#/]*',

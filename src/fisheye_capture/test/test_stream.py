@@ -48,6 +48,19 @@ def test_frames_come_with_the_time_at_which_they_came(camera, open_stream, encod
     assert before_ns < first.stamp_ns < second.stamp_ns <= time.time_ns()
 
 
+@pytest.mark.parametrize(
+    ('source', 'opened'),
+    [
+        ('http://user:p/w@rd@camera/a', 'http://user:p%2Fw%40rd@camera/a'),
+        ('http://user:123%2Fx@camera/a', 'http://user:123%2Fx@camera/a'),
+        ('http://camera:88/a?usr=me&pwd=p@ss', 'http://camera:88/a?usr=me&pwd=p@ss'),
+        ('rtsp://camera:554/live/a@b', 'rtsp://camera:554/live/a@b'),
+    ],
+)
+def test_only_user_and_password_are_quoted(settings, source, opened):
+    assert stream.request_of(settings(source)).url == opened
+
+
 def test_a_scheme_may_be_in_capitals(camera, open_stream):
     source = open_stream(camera.url.replace('http', 'HTTP'))
     assert source.read().size == (64, 48)
