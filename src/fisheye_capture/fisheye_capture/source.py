@@ -107,11 +107,11 @@ CREDENTIALS = (
 What looks like a port and a path, or an IPv6 address, is none: an @ may stand further on.
 """
 _SECRETS = re.compile(
-    '((?:user|usr|login|account|pass|pwd|pw|token|key|auth|secret|session|sid|credential)'
-    r'[^=&?/;]{0,16}=)[^&;#/]*',
+    '((?:user|usr|login|account|pass|pwd|psw|pw|token|jwt|key|auth|secret|session|sid|ticket|'
+    'credential|sig|hash|nonce|code(?!c))[^=&?/;]{0,16}=)[^&]*',
     re.IGNORECASE,
 )
-"""Users and passwords further on in it: what stands behind such a word."""
+"""Users and passwords further on in it: what stands behind such a word, up to the next &."""
 
 
 def shown_source(source: str) -> str:
