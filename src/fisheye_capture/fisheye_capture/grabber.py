@@ -102,14 +102,11 @@ class Grabber:
 
     def damage(self) -> str:
         """Return what came damaged since this was last asked, in a sentence; '' for nothing."""
-        damaged, former = self.damaged, self._told_damaged
-        self._told_damaged = damaged
-        if damaged <= former:
+        source, former = self._source, self._told_damaged
+        self._told_damaged = source.damaged if source else 0
+        if source is None or not source.damage or self._told_damaged <= former:
             return ''
-        return (
-            f'{damaged - former} pictures came damaged and were dropped, each with those that are '
-            'drawn upon it; is the link good enough?'
-        )
+        return f'{self._told_damaged - former} {source.damage}'
 
     def start(self) -> None:
         """Begin to read; tell first why the source could not be opened, if so."""

@@ -63,14 +63,17 @@ class PacedSource(Source):
         return self._pace.skipped
 
     def read(self) -> Frame:
-        """Wait for the next point of the time grid and return its frame."""
-        stamp_ns = self._pace.wait()
-        return Frame(stamp_ns, self._picture(stamp_ns))
+        """Wait for the next point of the time grid that has a frame, and return it."""
+        while True:
+            stamp_ns = self._pace.wait()
+            image = self._picture(stamp_ns)
+            if image is not None:
+                return Frame(stamp_ns, image)
 
     def interrupt(self) -> None:
         """End a wait at once."""
         self._pace.interrupt()
 
     @abstractmethod
-    def _picture(self, stamp_ns: int) -> np.ndarray:
-        """Return the picture of a time."""
+    def _picture(self, stamp_ns: int) -> np.ndarray | None:
+        """Return the picture of a time; None if it has none."""

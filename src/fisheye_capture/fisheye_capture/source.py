@@ -74,12 +74,18 @@ class Source(ABC):
         Frames that were due while the one before was still in work.
     damaged
         Frames that came damaged and were not given.
+    damage
+        What is said of them behind their number; '' where `note` says it.
     """
 
     camera: Camera | None = None
     note: str = ''
     skipped: int = 0
     damaged: int = 0
+    damage: str = (
+        'pictures came damaged and were dropped, each with those that are drawn upon it; is the '
+        'link good enough?'
+    )
 
     @abstractmethod
     def read(self) -> Frame | JpegFrame:

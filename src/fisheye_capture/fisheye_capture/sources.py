@@ -114,7 +114,7 @@ def _open_picture(settings: CaptureSettings) -> Source:
 
 def _open_video(settings: CaptureSettings) -> Source:
     path = Path(_path(settings.source))
-    return SequenceSource(settings, video_pictures(path, settings.loop))
+    return SequenceSource(settings, lambda: video_pictures(path))
 
 
 def _open_pictures(settings: CaptureSettings) -> Source:
@@ -123,7 +123,7 @@ def _open_pictures(settings: CaptureSettings) -> Source:
         raise SourceError(
             f"the pictures of '{shown_source(settings.source)}' are not there any more"
         )
-    return SequenceSource(settings, folder_pictures(paths, settings.loop))
+    return SequenceSource(settings, lambda: folder_pictures(paths))
 
 
 SOURCES = {

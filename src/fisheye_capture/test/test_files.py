@@ -1,5 +1,7 @@
 """Pictures, folders and videos: held, in turn, looped; what cannot be read is named."""
 
+import re
+
 import cv2
 import numpy as np
 import pytest
@@ -63,15 +65,65 @@ def test_without_loop_the_end_is_the_end(settings, write_picture, tmp_path):
         source.read()
 
 
-def test_a_folder_of_different_sizes_names_the_first_that_differs(
-    settings, write_picture, tmp_path
-):
-    write_picture('folder/a.png', 1)
-    write_picture('folder/b.png', 1, width=40)
-    source = open_source(settings(tmp_path / 'folder'))
-    source.read()
-    with pytest.raises(SourceError, match=r'b\.png has 40x24 px.*have 32x24 px'):
+@pytest.fixture
+def folder(write_picture, tmp_path):
+    """Write pictures of levels 1, 2 ...; those of kind x are unreadable, those of kind o wider."""
+
+    def write(*kinds):
+        (tmp_path / 'folder').mkdir()
+        for number, kind in enumerate(kinds, 1):
+            name = f'folder/{number}.png'
+            if kind == 'x':
+                (tmp_path / name).write_bytes(b'')
+            else:
+                write_picture(name, number, width=40 if kind == 'o' else 32)
+        return tmp_path / 'folder'
+
+    return write
+
+
+@pytest.mark.parametrize(
+    ('kind', 'fault'),
+    [
+        ('x', r'2\.png is not a picture that can be read: .*'),
+        ('o', r'2\.png has 40x24 px; the pictures before it have 32x24 px'),
+    ],
+)
+def test_a_picture_that_cannot_be_shown_is_left_out_and_said_once(settings, folder, kind, fault):
+    source = open_source(settings(folder('', kind, '', kind)))
+    assert source.note == ''
+    assert levels(source, 5) == [1, 3, 1, 3, 1]
+    assert source.damaged == 4
+    assert re.fullmatch(f'.*{fault}; such pictures are left out', source.note)
+
+
+def test_after_a_picture_that_cannot_be_shown_the_rest_comes_once_without_loop(settings, folder):
+    source = open_source(settings(folder('x', '', 'x', '', 'o'), loop=False))
+    assert levels(source, 2) == [2, 4]
+    with pytest.raises(SourceEndedError, match='last picture'):
         source.read()
+
+
+def test_the_time_of_a_picture_that_cannot_be_shown_passes(settings, folder):
+    """So two cameras keep step."""
+    source = open_source(settings(folder('x', '', 'x', ''), frame_rate_hz=20.0))
+    first_ns, second_ns = source.read().stamp_ns, source.read().stamp_ns
+    assert second_ns - first_ns >= 2 * 50_000_000
+
+
+def test_a_folder_without_a_picture_that_can_be_shown_names_the_first(settings, folder):
+    with pytest.raises(SourceError, match=r'1\.png is not a picture'):
+        open_source(settings(folder('x', 'x')))
+
+
+def test_pictures_that_vanish_later_are_an_error(settings, folder):
+    path = folder('', '')
+    source = open_source(settings(path))
+    levels(source, 2)
+    for picture in path.iterdir():
+        picture.unlink()
+    with pytest.raises(SourceError, match=r'1\.png cannot be read: No such file'):
+        levels(source, 2)
 
 
 def test_a_video_is_paced_and_looped(settings, video):
@@ -120,12 +172,3 @@ def test_a_video_is_not_turned_whatever_it_says(settings, tmp_path):
     path.write_bytes(turned_video(path.read_bytes()))
     assert cv2.VideoCapture(str(path)).read()[1].shape == (64, 48, 3), 'others turn it'
     assert open_source(settings(path)).read().image.shape == (48, 64, 3)
-
-
-def test_an_unreadable_picture_in_a_folder_is_named(settings, write_picture, tmp_path):
-    write_picture('folder/a.png', 1)
-    (tmp_path / 'folder' / 'b.png').write_bytes(b'')
-    source = open_source(settings(tmp_path / 'folder'))
-    source.read()
-    with pytest.raises(SourceError, match=r'b\.png is not a picture'):
-        source.read()

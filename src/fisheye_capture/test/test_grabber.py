@@ -113,6 +113,24 @@ class Prepared(Source):
         self.is_closed = True
 
 
+def test_damage_is_told_of_a_camera_but_noted_of_files(grab, wait_until, write_picture, tmp_path):
+    write_picture('folder/a.png', 1)
+    (tmp_path / 'folder' / 'b.png').write_bytes(b'')
+    grabber, _ = grab(tmp_path / 'folder')
+    wait_until(lambda: grabber.damaged > 1, 'a second round')
+    assert (grabber.reason, grabber.damage()) == ('', '')
+    assert grabber.note.endswith('; such pictures are left out')
+
+
+def test_damage_is_told_once(settings, monkeypatch):
+    source = Prepared([])
+    source.damaged = 3
+    monkeypatch.setattr(grabber_module, 'open_source', lambda settings: source)
+    grabber = Grabber(settings('any'), print)
+    assert grabber.damage().startswith('3 pictures came damaged and were dropped, ')
+    assert grabber.damage() == ''
+
+
 def test_each_lost_source_is_closed_before_it_is_opened_again(grab, wait_until, monkeypatch):
     opened = [
         Prepared([Frame(1, None), SourceLostError('unplugged')]),
