@@ -89,5 +89,4 @@ class H264Decoder:
 def _fresh() -> PictureDecoder:
     context = av.CodecContext.create('h264', 'r')
     context.options = {'max_pixels': f'{_MAX_PIXELS}'}
-    context.thread_count = 1
     return PictureDecoder(context)
