@@ -22,10 +22,10 @@ from fisheye_core.video_settings import ENCODERS
 
 _USUAL_HZ = 30.0
 _PIXELS_OF_A_THREAD = 1_000_000
-_NEVER = 60_000
-"""Pictures between two keyframes of an encoder that is asked for each of them."""
 _RATE, _MOST = 0.85, 1.05
 """Shares of the cap: in no second more than the latter, as a full buffer adds to the rate."""
+_LATER = 1.2
+"""Keyframes are asked for by time; hardware that does not listen makes its own a little later."""
 _COMMON = {'colorspace': 'smpte170m', 'color_range': 'tv'}
 _OPTIONS = {
     'libx264': {'preset': 'superfast', 'tune': 'zerolatency', 'crf': '22', 'forced-idr': '1'},
@@ -76,7 +76,7 @@ class H264Encoder:
         names = ENCODERS[1:] if encoder == 'auto' else dict.fromkeys((encoder, ENCODERS[-1]))
         self._candidates, self._asked = list(names), encoder
         self._context: VideoCodecContext | None = None
-        self._opened: tuple[int, int, int, bool] = 0, 0, 0, False
+        self._opened: tuple[int, int, int, float] = 0, 0, 0, 0.0
         self._rate, self._count = PictureRate(_USUAL_HZ), 0
         self._is_keyframe_wanted, self._keyframe_s = False, 0.0
         self._parameter_sets = b''
@@ -116,7 +116,7 @@ class H264Encoder:
             due_s = self._keyframe_s + self.keyframe_s - 0.5 / self._rate.hz
             if now_s > due_s:
                 self.request_keyframe()
-        wanted = width, height, self.bitrate_kbps, self.keyframe_s == 0
+        wanted = width, height, self.bitrate_kbps, self.keyframe_s
         if self._context is None or has_new_rate or self._opened != wanted:
             self._opened = wanted
             picture = self._begin(planes)
@@ -163,7 +163,7 @@ class H264Encoder:
         return picture
 
     def _open(self, name: str) -> VideoCodecContext:
-        width, height, bitrate_kbps, is_rolling = self._opened
+        width, height, bitrate_kbps, keyframe_s = self._opened
         context = av.CodecContext.create(name, 'w')
         context.width, context.height, context.pix_fmt = width, height, 'yuv420p'
         hz = Fraction(self._rate.hz).limit_denominator(1000)
@@ -171,14 +171,14 @@ class H264Encoder:
         context.thread_type = 'SLICE'
         threads = width * height // _PIXELS_OF_A_THREAD + 1
         context.thread_count = min(threads, os.cpu_count() or 1)
-        interval = max(1, round(hz)) if is_rolling else _NEVER
+        interval = max(1, round(hz * (_LATER * keyframe_s or 1)))
         # The buffer holds one picture at least, which of a slow stream is much of a second.
         share = min(_RATE, _MOST * self._rate.hz / (self._rate.hz + 1))
         rate, buffer = (round(s * 1000 * bitrate_kbps) for s in (share, _MOST - share))
         options = {**_COMMON, **_OPTIONS[name], 'g': f'{interval}', 'bf': '0'}
         options |= {'b': f'{rate}', 'maxrate': f'{rate}', 'bufsize': f'{buffer}'}
         if name == 'libx264':
-            options['x264-params'] = f'scenecut=0:intra-refresh={is_rolling:d}'
+            options['x264-params'] = f'scenecut=0:intra-refresh={int(keyframe_s == 0)}'
         context.options = options
         context.open()
         return context
