@@ -2,8 +2,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from turning import lens_size, turn_sightings, turn_truth, turning_lens
+from turning import MOUNTS_DEG, lens_size, turn_sightings, turn_truth, turning_lens
 
+from fisheye_core.errors import CalibrationError
 from fisheye_geometry.attitude import Attitude, angle_between
 from panorama_stitch.turn.bundle import adjust
 from panorama_stitch.turn.halves import halves_of
@@ -13,7 +14,7 @@ NOISE_PX = 0.15
 FOCAL, ROTATION_DEG, VERTICAL_DEG = 0.003, 0.1, 0.05
 SIGMAS = 4.0
 SLOPE = 1e-4
-SIZES = [lens_size(turning_lens())] * 2
+SIZES = dict.fromkeys(MOUNTS_DEG, lens_size(turning_lens()))
 
 
 def start_from(truth: TurnState) -> TurnState:
@@ -21,7 +22,7 @@ def start_from(truth: TurnState) -> TurnState:
     rng = np.random.default_rng(3)
     lenses = np.zeros_like(truth.lenses)
     lenses[:, :2] = truth.lenses[:, :2] * 1.02
-    lenses[:, 2:4] = (np.array(SIZES) - 1) / 2
+    lenses[:, 2:4] = (np.array(lens_size(turning_lens())) - 1) / 2
     turns = [Attitude(0.0, 0.02, -0.02).matrix, Attitude(0.01, -0.02, 0.01).matrix]
     return replace(
         truth,
@@ -75,6 +76,32 @@ def test_deviations_are_those_of_the_errors(fitted):
 
 def test_halves_of_true_sightings_agree(fitted):
     assert halves_of(fitted[1], SIZES).scale < 2.0
+
+
+@pytest.mark.parametrize('jolted', [0, 7])
+def test_a_frame_that_nods_is_left_out(jolted):
+    truth = turn_truth(off_m=0.15, landmarks=120)
+    nod = Attitude(0.0, np.radians(5), np.radians(3)).matrix
+    steady = turn_sightings(truth, NOISE_PX)
+    nodding = turn_sightings(replace(truth, attitudes=nod @ truth.attitudes), NOISE_PX)
+    seen = steady.only(steady.frame != jolted).and_(nodding.only(nodding.frame == jolted))
+    fit = adjust(truth, seen, SIZES, yaws_known=True)
+    assert set(range(len(truth.angles))) - set(fit.seen.frame) == {jolted}
+    assert np.abs(fit.state.lenses[:, 0] / truth.lenses[:, 0] - 1).max() < FOCAL
+    assert np.sqrt(np.diag(fit.covariance)).max() < 1  # nothing drifts
+    assert halves_of(fit, SIZES).scale < 2.0
+
+
+def test_a_camera_that_saw_nothing_is_named(fitted):
+    fit = fitted[1]
+    left = fit.seen.only(fit.seen.camera == 0)
+    with pytest.raises(CalibrationError, match='nothing that right saw fits a turn'):
+        adjust(fit.state, left, SIZES, yaws_known=True)
+    x, _, z = fit.state.directions[fit.seen.landmark].T
+    is_even = np.arctan2(x, z) // np.radians(20) % 2 == 0
+    one_half = replace(fit, seen=fit.seen.only((fit.seen.camera == 0) | is_even))
+    with pytest.raises(CalibrationError, match='nothing that right saw fits a turn'):
+        halves_of(one_half, SIZES)
 
 
 def test_how_far_off_the_axis_shows_only_against_how_near_things_are():

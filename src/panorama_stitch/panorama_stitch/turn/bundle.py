@@ -1,12 +1,13 @@
 """Bundle adjustment of a turn: lenses, attitudes, places, angles and landmarks from sightings."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 from scipy.sparse import csr_matrix, diags, vstack
 
+from fisheye_core.errors import CalibrationError
 from panorama_stitch.turn.elimination import Elimination
 from panorama_stitch.turn.expectation import expected, in_metres
 from panorama_stitch.turn.landmarks import only
@@ -52,7 +53,7 @@ class TurnFit:
 def adjust(
     state: TurnState,
     seen: Sightings,
-    sizes: Sequence[tuple[int, int]],
+    sizes: Mapping[str, tuple[int, int]],
     *,
     yaws_known: bool,
     noise_px: float = 0.5,
@@ -66,14 +67,19 @@ def adjust(
     seen
         What was seen where.
     sizes
-        Width and height of each camera's pictures, px.
+        Width and height of the pictures of each camera, by its name, px.
     yaws_known
         Whether landmarks are seen by several cameras; else the yaw of each stays what it is.
     noise_px
         Expected deviation of a coordinate.
+
+    Raises
+    ------
+    CalibrationError
+        If a camera is left without sightings.
     """
     state, seen = _without_rare(state, seen)
-    free = _free(state, yaws_known)
+    free = _free(state, seen, sizes, yaws_known)
     cost = np.inf
     for _ in range(_ROUNDS):
         state, now = _TurnProblem(seen, sizes, free, noise_px, not yaws_known).solve(state)
@@ -84,19 +90,31 @@ def adjust(
             break
         cost = now if good.all() else np.inf
         state, seen = _without_rare(state, seen.only(good))
-        free = _free(state, yaws_known)
+        free = _free(state, seen, sizes, yaws_known)
     covariance = _TurnProblem(seen, sizes, free, noise_px, not yaws_known).covariance(state)
     return TurnFit(state, seen, covariance, noise_px)
 
 
-def _free(state: TurnState, yaws_known: bool) -> np.ndarray:
-    """Mark the unknowns that are fitted: the world's and the rig's frame must not drift."""
+def _free(
+    state: TurnState, seen: Sightings, cameras: Iterable[str], yaws_known: bool
+) -> np.ndarray:
+    """Mark the unknowns that are fitted: the world's and the rig's frame must not drift.
+
+    A frame during a jolt may be left without sightings: nothing tells its angle.
+    """
     free = np.ones(state.rig_count + 3 * len(state.directions), bool)
-    for camera in range(len(state.lenses)):
+    for camera, name in enumerate(cameras):
+        if camera not in seen.camera:
+            raise CalibrationError(
+                f'nothing that {name} saw fits a turn on the spot; expected a robot that turns '
+                'without jolts before things that stand still'
+            )
         if camera == 0 or not yaws_known:
             free[WIDTH * camera + OF_CAMERA.index('turn_y')] = False
             free[WIDTH * camera + OF_CAMERA.index('place_y')] = False
-    free[WIDTH * len(state.lenses)] = False
+    angles = WIDTH * len(state.lenses)
+    free[angles : state.rig_count] = np.isin(np.arange(len(state.angles)), seen.frame)
+    free[angles + seen.frame.min()] = False
     return free
 
 
@@ -112,13 +130,13 @@ class _TurnProblem:
     def __init__(
         self,
         seen: Sightings,
-        sizes: Sequence[tuple[int, int]],
+        sizes: Mapping[str, tuple[int, int]],
         free: np.ndarray,
         noise_px: float,
         first: bool,
     ):
         self._seen, self._free, self._noise = seen, free, noise_px
-        self._expected = partial(expected, sizes=sizes, first=first)
+        self._expected = partial(expected, sizes=list(sizes.values()), first=first)
 
     def solve(self, state: TurnState) -> tuple[TurnState, float]:
         """Return the state of least cost near another, and its cost.

@@ -1,6 +1,6 @@
 """Two calibrations, each from half of the landmarks: what they disagree in, nobody knows."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,8 +30,8 @@ class TurnHalves:
     scale: float
 
 
-def halves_of(fit: TurnFit, sizes: Sequence[tuple[int, int]]) -> TurnHalves:
-    """Fit either half of the landmarks, beginning with what fits all of them."""
+def halves_of(fit: TurnFit, sizes: Mapping[str, tuple[int, int]]) -> TurnHalves:
+    """Fit either half of the landmarks, beginning with what fits all of them, as `adjust` does."""
     x, _, z = fit.state.directions.T
     is_odd = (np.arctan2(x, z) // _SECTOR_RAD).astype(int) % 2 == 1
     fits = []

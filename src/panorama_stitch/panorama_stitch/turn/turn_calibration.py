@@ -74,11 +74,12 @@ def calibrate_turn(
     Raises
     ------
     CalibrationError
-        If the pictures show no full turn, or the cameras not the same place.
+        If the pictures show no full turn, or the cameras not the same place, or one of them
+        nothing that fits a turn.
     """
     frames = tracker.frames
     brightest = tuple(np.max(pictures, axis=0) for pictures in zip(*frames, strict=True))
-    sizes = [picture.shape[::-1] for picture in brightest]
+    sizes = {name: picture.shape[::-1] for name, picture in zip(cameras, brightest, strict=True)}
     starts = _starts(tracker, cameras, turns_right)
     fits = [adjust(state, seen, sizes, yaws_known=False) for state, seen in starts]
     fit = min(fits, key=lambda fit: fit.noise_px / len(fit.seen))
