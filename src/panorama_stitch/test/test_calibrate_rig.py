@@ -84,6 +84,8 @@ def test_from_folders_of_pictures_to_the_files_of_a_panorama(recorded, tmp_path,
         url = (tmp_path / f'{name}.yaml').as_uri()
         assert panorama[f'{name}.camera_info_url'] == url
         assert nodes[f'/**/{name}/capture']['ros__parameters']['camera_info_url'] == url
+    # What it wrote it may replace.
+    assert 'nowhere is not there' in refused(capsys, 'left=nowhere', '-o', tmp_path)
 
 
 def test_topics_are_watched_until_the_rig_has_come_round(pictures):
@@ -179,6 +181,12 @@ def test_a_scene_that_stands_still(recorded, tmp_path, capsys):
 )
 def test_bad_arguments_are_a_sentence(arguments, told, capsys):
     assert told in refused(capsys, *arguments)
+
+
+def test_parameters_of_the_user_are_not_replaced(tmp_path, capsys):
+    (tmp_path / 'rig.yaml').write_text('/**:\n  ros__parameters: {width: 640}\n')
+    told = refused(capsys, 'left=nowhere', '-o', tmp_path)
+    assert 'rig.yaml cannot be written: there is one that calibrate_rig did not write' in told
 
 
 def test_without_ros_only_topics_are_refused(monkeypatch, capsys):

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from fisheye_core.errors import SettingError
-from fisheye_core.yaml_file import write_mapping
+from fisheye_core.errors import FileAccessError, SettingError
+from fisheye_core.yaml_file import is_missing, read_text, write_mapping
 from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.camera_file import Camera, write_camera
 from fisheye_geometry.level import DOWN, levelled
@@ -15,6 +15,7 @@ from panorama_stitch.turn.turn_calibration import TurnCalibration
 
 PARAMETERS = 'rig.yaml'
 """Name of the parameter file."""
+_FIRST_LINE = 'Written by calibrate_rig, which replaces it: copy it to add parameters.'
 
 
 def mounts_of(attitudes: np.ndarray) -> list[Attitude]:
@@ -23,12 +24,14 @@ def mounts_of(attitudes: np.ndarray) -> list[Attitude]:
 
 
 def camera_paths(folder: Path, cameras: Sequence[str]) -> list[Path]:
-    """Return the file of each camera in a folder.
+    """Return the file of each camera in a folder, in which nothing of the user's is lost.
 
     Raises
     ------
     SettingError
         If it would be overwritten by another one of the rig.
+    FileAccessError
+        If there are parameters in the folder that `write_rig` did not write.
     """
     owners = {PARAMETERS: 'the parameters'}
     for camera in cameras:
@@ -39,6 +42,13 @@ def camera_paths(folder: Path, cameras: Sequence[str]) -> list[Path]:
                 'names that differ as files'
             )
         owners[name] = f"camera '{camera}'"
+    parameters = folder / PARAMETERS
+    if not is_missing(parameters) and not read_text(parameters).startswith(f'# {_FIRST_LINE}\n'):
+        raise FileAccessError(
+            parameters,
+            'written',
+            'there is one that calibrate_rig did not write; expected another folder as -o',
+        )
     return [folder / name for name in owners if name != PARAMETERS]
 
 
@@ -62,7 +72,7 @@ def write_rig(folder: Path, calibration: TurnCalibration) -> list[Path]:
     SettingError
         As `camera_paths`.
     FileAccessError
-        If one cannot be written.
+        As `camera_paths`, or if one cannot be written.
     """
     state, cameras = calibration.fit.state, calibration.cameras
     paths = camera_paths(folder, cameras)
@@ -79,5 +89,6 @@ def write_rig(folder: Path, calibration: TurnCalibration) -> list[Path]:
     nodes |= {f'/**/{name}/capture': {'camera_info_url': url} for name, url in urls.items()}
     nodes |= {'/**/stitch': {**mounts}, '/**/panorama': {**lenses, **mounts}}
     parameters = folder / PARAMETERS
-    write_mapping(parameters, {node: {'ros__parameters': told} for node, told in nodes.items()})
+    by_node = {node: {'ros__parameters': told} for node, told in nodes.items()}
+    write_mapping(parameters, by_node, _FIRST_LINE)
     return [*paths, parameters]
