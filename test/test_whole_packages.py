@@ -118,7 +118,8 @@ def test_a_package_passes_its_own_tests_on_its_dependencies_alone(workspaces, pa
     installed = workspaces.installed(package)
     everything = dict.fromkeys([*needed(package, RUN + TEST), package])
     workspaces.check(
-        'python -m pytest -q -p no:cacheprovider',
+        'python -m pytest -q -p no:cacheprovider '
+        '-p fisheye_testing.own_domain -p fisheye_testing.unhurried',
         where=workspaces.folder(package) / 'src' / package,
         packages=everything,
     )

@@ -43,6 +43,17 @@ def test_setup_says_what_the_manifest_says(setup):
     assert 'py.typed' in ast.unparse(told['package_data'])
 
 
+@pytest.mark.parametrize('setup', SETUPS, ids=lambda path: path.parent.name)
+def test_a_package_changes_nothing_for_the_tests_of_others(setup):
+    entries = keywords(setup).get('entry_points')
+    assert set(ast.literal_eval(entries or '{}')) <= {'console_scripts'}
+
+
+def test_plugins_are_loaded_for_our_own_tests(pytestconfig):
+    for plugin in ('own_domain', 'unhurried'):
+        assert pytestconfig.pluginmanager.has_plugin(f'fisheye_testing.{plugin}')
+
+
 @pytest.mark.parametrize('manifest', MANIFESTS, ids=lambda path: path.parent.name)
 def test_a_package_brings_its_license_and_changelog(manifest):
     folder = manifest.parent

@@ -11,12 +11,6 @@ setup(
     license='Apache-2.0',
     packages=[package_name],
     package_data={package_name: ['py.typed']},
-    entry_points={
-        'pytest11': [
-            'own_domain = fisheye_testing.own_domain',
-            'unhurried = fisheye_testing.unhurried',
-        ]
-    },
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),
