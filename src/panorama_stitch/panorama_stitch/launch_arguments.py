@@ -13,6 +13,7 @@ from fisheye_core.errors import SettingError
 from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.rig import CAMERA_NAME, MAX_CAMERAS
 from panorama_stitch.overlap.saved_rig import saved_rig
+from panorama_stitch.pipeline.view_settings import ViewNames
 
 CONFIG = Path(get_package_share_directory('panorama_stitch')) / 'config'
 ARGUMENTS = {
@@ -82,10 +83,19 @@ def checked(arguments: dict[str, str], cameras: list[str]) -> dict[str, Any]:
         raise SettingError(f"params_file is '{paths['params_file']}', which is not a file")
     rate = arguments['frame_rate_hz']
     rates = {'frame_rate_hz': number('frame_rate_hz', rate)} if rate else {}
-    views = [name.strip() for name in arguments['views'].split(',')] if arguments['views'] else ''
+    views = [name.strip() for name in arguments['views'].split(',')] if arguments['views'] else []
+    ViewNames(tuple(views)).check_views(cameras)  # else the node would, at each of its starts
     # Those of cameras that are not declared are there only if they were given.
     own = {name: arguments.get(name, '') for name in arguments_of(cameras)}
-    return {**arguments, **own, **flags, **paths, **rates, 'cameras': cameras, 'views': views}
+    return {
+        **arguments,
+        **own,
+        **flags,
+        **paths,
+        **rates,
+        'cameras': cameras,
+        'views': views or '',
+    }
 
 
 def flag(name: str, text: str) -> bool:

@@ -77,6 +77,10 @@ def test_files_in_the_home(rig, tmp_path, monkeypatch):
         ({'cameras': 'a,b,c,d,e,f,g,h,i'}, 'cameras is a,b,c,d,e,f,g,h,i; expected 1 to 8'),
         ({'cameras': 'front,2nd'}, "cameras has '2nd'; expected names of a letter, then"),
         ({'cameras': ''}, "cameras has ''; expected names of a letter, then"),
+        ({'views': '[front,rear]'}, r"views has '\[front'; expected a letter, then letters"),
+        ({'views': 'front rear,'}, "views has 'front rear'; expected a letter, then letters"),
+        ({'views': 'front,'}, "views has ''; expected a letter, then letters"),
+        ({'views': 'left'}, "views has 'left', whose topics are those of a camera already"),
         ({'front_source': '0'}, "no argument 'front_source'; expected cameras, .*, left_source"),
         (
             {'cameras': 'a,b', 'left_source': '0'},
