@@ -32,12 +32,20 @@ def test_a_folder_with_any_names(tmp_path):
     for name in ('rear', 'front'):
         write_camera(tmp_path / f'{name}.yaml', Camera(name, synthetic_lens(32, 24, np.pi)))
         cv2.imwrite(str(tmp_path / f'{name}.png'), np.zeros((24, 32, 3), np.uint8))
+    for other in ('rig.yaml', 'overlap.yaml', 'panorama.png'):
+        (tmp_path / other).touch()
     assert list(folder_rig(tmp_path).cameras) == ['front', 'rear']
+    assert list(folder_rig(tmp_path, ['rear', 'front']).cameras) == ['rear', 'front']
     (tmp_path / 'truth.json').write_text('{"cameras": ["rear", "front"], "closed": true}')
     rig = folder_rig(tmp_path)
     assert (list(rig.cameras), rig.is_closed, rig.attitudes) == (['rear', 'front'], True, ())
+    assert list(folder_rig(tmp_path, ['front']).cameras) == ['front']
     (tmp_path / 'front.png').unlink()
     with pytest.raises(FileNotFoundError, match=r'front.png is not there; expected .png and'):
+        folder_rig(tmp_path)
+    (tmp_path / 'rear.png').unlink()
+    (tmp_path / 'truth.json').unlink()
+    with pytest.raises(FileNotFoundError, match=r'/\*.png is not there; expected .png and'):
         folder_rig(tmp_path)
 
 

@@ -22,6 +22,7 @@ from fisheye_testing.waiting import wait_for
 from fisheye_testing.watcher import Watcher
 from fisheye_undistort.correction import Correction
 from fisheye_undistort.undistort_settings import UndistortSettings
+from panorama_stitch.launch_arguments import camera_names
 
 START_TIMEOUT_S = 60.0
 SYNTHETIC_ROBOT = {'robot_width_m': 1.2, 'camera_height_m': EYE_HEIGHT_M}
@@ -141,6 +142,14 @@ def parse() -> argparse.Namespace:
         default='pair',
         help=f'{", ".join(SYNTHETIC_RIGS)}, or a folder with .png and .yaml of each camera',
     )
+    parser.add_argument(
+        '--cameras',
+        type=camera_names,
+        metavar='NAMES',
+        default=[],
+        help='those of a folder from left to right, a ring clockwise as seen from above: '
+        'front,right,rear,left (default: in the order of their names)',
+    )
     parser.add_argument('--out', type=Path, default=Path('out'), help='where results go')
     parser.add_argument('--seconds', type=float, default=5.0, help='how long to watch')
     parser.add_argument('--rate', type=float, default=30.0, help='frames a second')
@@ -154,21 +163,22 @@ def parse() -> argparse.Namespace:
     )
     arguments = parser.parse_args()
     try:
-        arguments.known = known_rig(arguments.rig)
+        arguments.known = known_rig(arguments.rig, arguments.cameras)
     except FileNotFoundError as error:
         parser.error(str(error))
     return arguments
 
 
-def known_rig(name: str) -> KnownRig:
-    """Return the rig that a name or a folder means."""
-    if name in SYNTHETIC_RIGS:
+def known_rig(name: str, cameras: list[str]) -> KnownRig:
+    """Return the rig that a name or a folder means, in which cameras may be named."""
+    if name in SYNTHETIC_RIGS and not cameras:
         return synthetic_rig(name)
     if not Path(name).is_dir():
         raise FileNotFoundError(
-            f'--rig is {name}; expected {", ".join(SYNTHETIC_RIGS)}, or a folder'
+            f'--rig is {name}; expected {", ".join(SYNTHETIC_RIGS)}, or a folder, which --cameras '
+            'needs'
         )
-    return folder_rig(Path(name))
+    return folder_rig(Path(name), cameras)
 
 
 def watch(watcher: Watcher, rig: RigProcesses, seconds: float) -> None:

@@ -1,6 +1,7 @@
 """Rigs of synthetic cameras, and what is known of rigs in folders."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import pi, radians
 from pathlib import Path
@@ -82,10 +83,17 @@ def synthetic_rig(name: str) -> KnownRig:
     return KnownRig(cameras, common, attitudes, is_closed=name.startswith(('ring', 'back')))
 
 
-def folder_rig(folder: Path) -> KnownRig:
+def folder_rig(folder: Path, cameras: Sequence[str] = ()) -> KnownRig:
     """Return the rig whose images and calibrations a folder holds, with what truth.json knows.
 
     Without one the cameras stand in the order of their names.
+
+    Parameters
+    ----------
+    folder
+        Holds NAME.png and NAME.yaml of each camera, and maybe other files.
+    cameras
+        Names from left to right; they do without truth.json.
 
     Raises
     ------
@@ -93,13 +101,18 @@ def folder_rig(folder: Path) -> KnownRig:
         If the folder holds no camera, or an image or a calibration is missing.
     """
     path = folder / 'truth.json'
-    truth = json.loads(path.read_text()) if path.is_file() else {}
-    names = truth.get('cameras') or sorted(entry.stem for entry in folder.glob('*.yaml'))
+    truth = {'cameras': cameras}
+    if not cameras and path.is_file():
+        truth = json.loads(path.read_text())
+    pictures = sorted(folder.glob('*.png'))
+    names = truth.get('cameras') or [
+        picture.stem for picture in pictures if picture.with_suffix('.yaml').is_file()
+    ]
     files = [folder / f'{name}.{suffix}' for name in names for suffix in ('png', 'yaml')]
     missing = [str(file) for file in files if not file.is_file()]
     if missing or not names:
         raise FileNotFoundError(
-            f'{missing[0] if missing else folder / "*.yaml"} is not there; expected .png and '
+            f'{missing[0] if missing else folder / "*.png"} is not there; expected .png and '
             '.yaml of each camera'
         )
     attitudes = truth.get('attitude', {})
