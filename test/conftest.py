@@ -8,7 +8,7 @@ from pathlib import Path
 
 import hypothesis
 import pytest
-from chromium import chromium
+from chromium import INSTALL, browser_path, chromium, driver_path
 from field import Field
 
 from fisheye_testing.data import real_data
@@ -68,9 +68,9 @@ def one(tmp_path_factory):
 
 @pytest.fixture(scope='module')
 def browser(tmp_path_factory):
-    """Return a headless Chromium, as packaged by Debian."""
-    if missing := [name for name in ('chromium', 'chromedriver') if not shutil.which(name)]:
-        message = f'{" and ".join(missing)} missing: sudo apt install chromium chromium-driver'
+    """Return a headless Chromium."""
+    if not (browser_path() and driver_path()):
+        message = f'Chromium or its driver is missing: {INSTALL}'
         if os.environ.get('REQUIRE_BROWSER') == '1':
             pytest.fail(message)
         pytest.skip(message)

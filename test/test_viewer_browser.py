@@ -1,4 +1,4 @@
-"""The viewer's page in a real browser: headless Chromium, as packaged by Debian."""
+"""The viewer's page in a real browser: headless Chromium."""
 
 import math
 import re
@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 import viewer_page
+from chromium import browser_path, driver_path
 from known_rigs import synthetic_rig
 from selenium.webdriver import Keys
 from viewer_page import (
@@ -41,6 +42,15 @@ BACKGROUND = 27, 21, 16
 """Of the page, blue, green and red."""
 OVERLAP_DEG = 50.0
 """Of two cameras of 170 degrees, 120 apart."""
+
+
+@pytest.mark.parametrize('driver', ['chromedriver', 'chromium.chromedriver'])
+def test_a_driver_is_found_as_a_package_and_as_a_snap_call_it(driver, tmp_path, monkeypatch):
+    monkeypatch.setenv('PATH', str(tmp_path))
+    assert (browser_path(), driver_path()) == (None, None)
+    for name in ('chromium', driver):
+        (tmp_path / name).touch(mode=0o755)
+    assert (browser_path(), driver_path()) == (str(tmp_path / 'chromium'), str(tmp_path / driver))
 
 
 def test_every_kind_of_surface_is_tried_here():

@@ -14,10 +14,9 @@ if [ $packages != 0 ]; then
   echo 'Tests of packages have failed:' >&2
   colcon test-result >&2
 fi
-packages_missing=
-command -v chromium > /dev/null && command -v chromedriver > /dev/null ||
-  packages_missing+=' chromium chromium-driver'
-command -v ip > /dev/null || packages_missing+=' iproute2'
-[ -z "$packages_missing" ] ||
-  echo "Not tested: what needs a browser or a network of its own. sudo apt install$packages_missing"
+{ command -v chromium && { command -v chromedriver || command -v chromium.chromedriver; }; } > /dev/null ||
+  echo 'Not tested: what needs a browser. On Debian sudo apt install chromium chromium-driver,' \
+    'on Ubuntu sudo snap install chromium'
+command -v ip > /dev/null ||
+  echo 'Not tested: what needs a network of its own. sudo apt install iproute2'
 [ $packages = 0 ] && [ $across = 0 ]
