@@ -201,6 +201,7 @@ def test_ros_reads_what_is_written_for_it(tmp_path):
         ('x: 3\n camera_model: pinhole\n', 'it lacks something|not'),
         (OCAM_AHEAD, 'the model sees nothing of its picture'),
         ('%YAML:1.0\n---\nK: 3\n', 'it lacks something|it has none of'),
+        ('%YAML:1.0\n---\nimage_width: 640\nimage_h', 'it lacks something'),
         ("{'lensmodel': open('/etc/passwd')}", 'it lacks something|image_width|not'),
     ],
 )

@@ -46,7 +46,8 @@ def read_foreign(path: str | Path) -> tuple[Samples, str]:
         raise
     except (FileContentError, CalibrationError) as error:
         raise CameraFileError(error, path) from error
-    except (LookupError, TypeError, ValueError, SyntaxError, cv2.error) as error:
+    except (LookupError, TypeError, ValueError, SyntaxError, SystemError, cv2.error) as error:
+        # OpenCV's constructors raise their cv2.error as a SystemError.
         raise CameraFileError(
             f'it lacks something ({error!r:.80}); expected {_KNOWN}', path
         ) from error
