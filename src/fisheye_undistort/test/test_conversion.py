@@ -162,6 +162,13 @@ def test_models_of_other_programs(text, project, reach_deg, tmp_path):
     demand(conversion.lens, project, reach_deg)
 
 
+@pytest.mark.parametrize('k1', [-0.09, -0.14])
+def test_a_lens_whose_curve_ends_inside_the_picture_is_converted_exactly(k1, tmp_path):
+    text = camchain('pinhole', [190, 190, 320, 240], 'equidistant', [k1, 0.0, 0.0, 0.0])
+    (tmp_path / 'chain.yaml').write_text(text)
+    assert convert(tmp_path / 'chain.yaml').worst_deg < 1e-3
+
+
 def test_what_four_coefficients_cannot_follow_is_told(tmp_path):
     text = camchain('pinhole', [400, 401, 320, 240], 'radtan', [-0.2, 0.03, 0.01, 0.02])
     (tmp_path / 'camera.yaml').write_text(text)

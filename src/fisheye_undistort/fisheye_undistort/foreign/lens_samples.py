@@ -58,9 +58,11 @@ def samples_of_projection(
         pixels = project(rays)
         center = project(np.array([0.0, 0.0, 1.0]))
         radius = np.linalg.norm(pixels - center, axis=-1)
-        grows = np.diff(radius, axis=1, prepend=0.0) > 0
+        growth = np.diff(radius, axis=1, prepend=0.0)
     inside = np.all((pixels > -0.5) & (pixels < np.array(size) - 0.5), axis=-1)
-    use = np.logical_and.accumulate(grows, axis=1) & inside
+    use = np.logical_and.accumulate(growth > 0, axis=1) & inside
+    # Of two samples on both sides of the curve's end the second may have the larger radius.
+    use[:, :-1] &= ~(growth[:, 1:] <= 0)
     return Samples(rays[use], pixels[use], size)
 
 
