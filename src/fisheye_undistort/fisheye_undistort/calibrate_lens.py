@@ -65,7 +65,7 @@ def _compare(options: argparse.Namespace) -> int:
 
 
 def _convert(options: argparse.Namespace) -> int:
-    conversion = convert(options.convert)
+    conversion = convert(options.convert, options.camera)
     output = options.output or Path(f'{options.name}.yaml')
     write_as(options.to, output, Camera(options.name, conversion.lens), str(conversion))
     print(f'{conversion}\nwritten  {output}')

@@ -30,6 +30,7 @@ def make_parser(description: str | None) -> argparse.ArgumentParser:
     add('--print', metavar='SHEET', help='write the target as .pdf, .svg or .png, and do no more')
     add('--compare', nargs=2, metavar='YAML', help='two calibrations of one camera, and no more')
     add('--convert', metavar='FILE', help='fit our lens to a calibration of another program')
+    add('--camera', default='', help='of a FILE that holds several: cam1; of an OpenCV pair: 1, 2')
     add(
         '--to', choices=FORMATS, default='ros', help='what -o is written as (default: %(default)s)'
     )

@@ -178,6 +178,51 @@ def test_what_four_coefficients_cannot_follow_is_told(tmp_path):
     assert f'{conversion.worst_px:.2f} px' in str(conversion)
 
 
+def opencv_camera(focal, number='', indent=''):
+    """Return K and D as OpenCV writes them."""
+    matrices = ('K', 3, [focal, 0.0, 320.0, 0.0, focal, 240.0, 0.0, 0.0, 1.0]), ('D', 1, [0.0] * 4)
+    return ''.join(
+        f'{indent}{key}{number}: !!opencv-matrix\n{indent}   rows: {rows}\n'
+        f'{indent}   cols: {len(data) // rows}\n{indent}   dt: d\n{indent}   data: {data}\n'
+        for key, rows, data in matrices
+    )
+
+
+CHAIN = camchain('ds', [-0.2, 0.5, 200, 200, 320, 240]) + camchain(
+    'pinhole', [150, 150, 320, 240], 'equidistant', [0.0] * 4
+).replace('cam0', 'cam1')
+OPENCV = '%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\n'
+PAIR = OPENCV + opencv_camera(200.0, '1') + opencv_camera(150.0, '2')
+PARTS = (
+    f'{OPENCV}left:\n{opencv_camera(200.0, indent="   ")}'
+    f'right:\n{opencv_camera(150.0, indent="   ")}'
+)
+
+
+@pytest.mark.parametrize(
+    ('text', 'camera', 'names'),
+    [
+        pytest.param(CHAIN, 'cam1', 'cam0, cam1', id='kalibr'),
+        pytest.param(PAIR, '2', '1, 2', id='OpenCV stereo'),
+        pytest.param(PARTS, 'right', 'left, right', id='OpenCV parts'),
+    ],
+)
+def test_one_of_several_cameras_must_be_chosen(text, camera, names, tmp_path):
+    path = tmp_path / 'pair.yaml'
+    path.write_text(text)
+    for asked in ('', 'top'):
+        told = rf'pair\.yaml: it holds {names}; choose one with --camera {camera}'
+        with pytest.raises(CameraFileError, match=told):
+            convert(path, asked)
+    assert abs(convert(path, camera).lens.focal_x_px - 150) < 1e-3
+
+
+def test_a_camera_of_a_file_that_names_none_is_refused(tmp_path):
+    (tmp_path / 'calib_results.txt').write_text(OCAM_AHEAD)
+    with pytest.raises(CameraFileError, match=r'calib_results\.txt: it names no .* \'cam1\''):
+        convert(tmp_path / 'calib_results.txt', 'cam1')
+
+
 @pytest.mark.parametrize('kind', FORMATS)
 def test_what_is_written_is_read_again(kind, tmp_path):
     lens = fisheye(190)

@@ -51,15 +51,20 @@ class Conversion:
         )
 
 
-def convert(path: str | Path) -> Conversion:
+def convert(path: str | Path, camera: str = '') -> Conversion:
     """Read a calibration of another program and fit our lens to it.
+
+    Parameters
+    ----------
+    path, camera
+        As `read_foreign`.
 
     Raises
     ------
     FileAccessError, CameraFileError
         As `read_foreign`.
     """
-    samples, model = read_foreign(path)
+    samples, model = read_foreign(path, camera)
     unknowns = _fit(samples)
     lens = lens_of(unknowns, samples.size)
     off_px = np.linalg.norm(project(unknowns, samples.rays)[0] - samples.pixels, axis=-1)

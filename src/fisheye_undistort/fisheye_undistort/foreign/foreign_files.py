@@ -2,6 +2,7 @@
 
 import ast
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +22,19 @@ _KNOWN = (
 )
 
 
-def read_foreign(path: str | Path) -> tuple[Samples, str]:
+_MATRIX = ('camera_matrix', 'cameramatrix', 'k')
+"""Keys of OpenCV's matrix, in small letters."""
+
+
+def read_foreign(path: str | Path, camera: str = '') -> tuple[Samples, str]:
     """Read a calibration of another program.
+
+    Parameters
+    ----------
+    path
+        Of the file.
+    camera
+        Which one of a file that holds several: its name; '1' or '2' of an OpenCV stereo pair.
 
     Returns
     -------
@@ -36,12 +48,15 @@ def read_foreign(path: str | Path) -> tuple[Samples, str]:
     FileAccessError
         If the file cannot be read.
     CameraFileError
-        If it is of no known kind, or describes no lens; the sentence names the file.
+        If it is of no known kind, describes no lens, or several and not the one that was named;
+        the sentence names the file.
     """
     text = read_text(path)
     read = next(read for sign, read in _READERS if re.search(sign, text, re.MULTILINE))
     try:
-        return read(text, path)
+        if camera and read not in (_kalibr, _opencv):
+            raise CalibrationError(f"it names no cameras of which one could be '{camera}'")
+        return read(text, path, camera)
     except CameraFileError:
         raise
     except (FileContentError, CalibrationError) as error:
@@ -53,13 +68,27 @@ def read_foreign(path: str | Path) -> tuple[Samples, str]:
         ) from error
 
 
-def _kalibr(text: str, path: str | Path) -> tuple[Samples, str]:
-    chain = parse_mapping(text)
-    camera: Any = next((value for value in chain.values() if isinstance(value, dict)), None)
-    model, distortion = camera['camera_model'], camera.get('distortion_model', 'none')
-    width, height = camera['resolution']
-    numbers = [float(value) for value in camera['intrinsics']]
-    extra = [float(value) for value in camera.get('distortion_coeffs', [])]
+def _chosen(cameras: dict[str, Any], camera: str) -> Any:
+    """Return the camera of a name; '' means the only one."""
+    if not camera and len(cameras) == 1:
+        return next(iter(cameras.values()))
+    if camera not in cameras:
+        *_, last = cameras
+        raise CalibrationError(f'it holds {", ".join(cameras)}; choose one with --camera {last}')
+    return cameras[camera]
+
+
+def _kalibr(text: str, path: str | Path, camera: str) -> tuple[Samples, str]:
+    chain = {
+        name: entry
+        for name, entry in parse_mapping(text).items()
+        if isinstance(entry, dict) and 'camera_model' in entry
+    }
+    entry = _chosen(chain, camera)
+    model, distortion = entry['camera_model'], entry.get('distortion_model', 'none')
+    width, height = entry['resolution']
+    numbers = [float(value) for value in entry['intrinsics']]
+    extra = [float(value) for value in entry.get('distortion_coeffs', [])]
     if (model, distortion) == ('pinhole', 'equidistant'):
         fx, fy, cx, cy = numbers
         project = models.fisheye(fx, fy, cx, cy, extra)
@@ -76,7 +105,7 @@ def _kalibr(text: str, path: str | Path) -> tuple[Samples, str]:
     return samples_of_projection(project, (int(width), int(height))), f'{model} {distortion}'
 
 
-def _ocam(text: str, path: str | Path) -> tuple[Samples, str]:
+def _ocam(text: str, path: str | Path, camera: str) -> tuple[Samples, str]:
     rows = [line.split() for line in text.splitlines() if line.strip() and line[0] != '#']
     numbers = [[float(value) for value in row] for row in rows]
     count, *polynomial = numbers[0]
@@ -89,7 +118,7 @@ def _ocam(text: str, path: str | Path) -> tuple[Samples, str]:
     return samples_of_ocam(polynomial, (row, column), (c, d, e), size), 'OCam'
 
 
-def _mrcal(text: str, path: str | Path) -> tuple[Samples, str]:
+def _mrcal(text: str, path: str | Path, camera: str) -> tuple[Samples, str]:
     fields = ast.literal_eval(text.strip())
     model, (width, height) = fields['lensmodel'], fields['imagersize']
     fx, fy, cx, cy, *extra = map(float, fields['intrinsics'])
@@ -111,13 +140,11 @@ def _mrcal(text: str, path: str | Path) -> tuple[Samples, str]:
     return samples_of_projection(project, (int(width), int(height))), name
 
 
-def _opencv(text: str, path: str | Path) -> tuple[Samples, str]:
+def _opencv(text: str, path: str | Path, camera: str) -> tuple[Samples, str]:
     storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ + cv2.FILE_STORAGE_MEMORY)
-    found = _nodes(storage.root())
-    matrix = _first(found, ('camera_matrix', 'cameramatrix', 'k', 'k1')).mat()
-    coefficients = (
-        _first(found, ('distortion_coefficients', 'distcoeffs', 'd', 'd1')).mat().ravel()
-    )
+    found = _chosen(_opencv_cameras(storage.root()), camera)
+    matrix = _first(found, _MATRIX).mat()
+    coefficients = _first(found, ('distortion_coefficients', 'distcoeffs', 'd')).mat().ravel()
     size = _size(found)
     fx, fy, cx, cy = matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2]
     flag = found.get('fisheye_model')
@@ -130,15 +157,37 @@ def _opencv(text: str, path: str | Path) -> tuple[Samples, str]:
     return samples_of_projection(project, size), name
 
 
-def _nodes(node) -> dict[str, Any]:
-    """Return all nodes of a storage by their names in small letters, outer ones first."""
-    found: dict[str, Any] = {}
-    for key in node.keys() if node.isMap() else ():
+def _opencv_cameras(root) -> dict[str, dict[str, Any]]:
+    """Return the nodes of each camera: of every part with a matrix, or of K1 D1 and K2 D2."""
+    shared = _nodes(root)
+    cameras = {name: _nodes(part) for name, part in _parts(root) if {*_MATRIX} & {*_keys(part)}}
+    if not cameras:
+        numbers = [number for number in '12' if f'k{number}' in shared]
+        cameras = {n: {'k': shared[f'k{n}'], 'd': shared[f'd{n}']} for n in numbers}
+    return {name: {**shared, **camera} for name, camera in cameras.items()} or {'1': shared}
+
+
+def _parts(node, *path: str) -> Iterator[tuple[str, Any]]:
+    """Yield all nodes of a storage by their names, outer ones first, and none of matrices."""
+    yield '.'.join(path) or '1', node
+    for key in _keys(node).values():
         child = node.getNode(key)
-        found.setdefault(key.lower(), child)
-        if child.isMap() and 'data' not in child.keys():  # noqa: SIM118 - it is no dict
-            found = {**_nodes(child), **found}
+        if 'data' not in _keys(child):
+            yield from _parts(child, *path, key)
+
+
+def _nodes(node) -> dict[str, Any]:
+    """Return all nodes of a storage by their keys in small letters, outer ones first."""
+    found: dict[str, Any] = {}
+    for _, part in _parts(node):
+        for small, key in _keys(part).items():
+            found.setdefault(small, part.getNode(key))
     return found
+
+
+def _keys(node) -> dict[str, str]:
+    """Return the keys of a node, by the same in small letters; there are none if it is no map."""
+    return {key.lower(): key for key in node.keys()} if node.isMap() else {}  # noqa: SIM118
 
 
 def _first(found: dict[str, Any], names: tuple[str, ...]):
@@ -160,7 +209,7 @@ def _size(found: dict[str, Any]) -> tuple[int, int]:
     )
 
 
-def _camera_info(text: str, path: str | Path) -> tuple[Samples, str]:
+def _camera_info(text: str, path: str | Path, camera: str) -> tuple[Samples, str]:
     lens = read_camera(path).lens
 
     def project(rays):
