@@ -34,8 +34,15 @@ def read_mapping(path: str | Path) -> Mapping:
         raise FileContentError(error.reason, path) from error
 
 
-def read_text(path: str | Path) -> str:
+def read_text(path: str | Path, max_bytes: int = _MAX_BYTES) -> str:
     """Read a short text file; of a longer one the YAML documents that begin it.
+
+    Parameters
+    ----------
+    path
+        Of the file.
+    max_bytes
+        What is still short.
 
     Raises
     ------
@@ -45,15 +52,15 @@ def read_text(path: str | Path) -> str:
         If it is too large or not text.
     """
     try:
-        content = read_regular(path, _MAX_BYTES)
+        content = read_regular(path, max_bytes)
     except OSError as error:
         raise FileAccessError(path, 'read', error.strerror) from error
-    if len(content) > _MAX_BYTES:
+    if len(content) > max_bytes:
         # A topic that was echoed into a file: its first message is enough.
         content = content[: content.rfind(b'\n---') + 1]
         if not content:
             raise FileContentError(
-                f'it is larger than {_MAX_BYTES} bytes; expected a short YAML file', path
+                f'it is larger than {max_bytes} bytes; expected a short YAML file', path
             )
     try:
         return content.decode()

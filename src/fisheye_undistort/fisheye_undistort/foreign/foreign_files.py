@@ -20,8 +20,8 @@ _KNOWN = (
     "Kalibr's camchain, OCamCalib's calib_results.txt, OpenCV's FileStorage, mrcal's .cameramodel "
     'or camera_info'
 )
-
-
+_MAX_BYTES = 10_000_000
+"""What mrcal fitted a lens to stands in its file, too."""
 _MATRIX = ('camera_matrix', 'cameramatrix', 'k')
 """Keys of OpenCV's matrix, in small letters."""
 
@@ -51,7 +51,7 @@ def read_foreign(path: str | Path, camera: str = '') -> tuple[Samples, str]:
         If it is of no known kind, describes no lens, or several and not the one that was named;
         the sentence names the file.
     """
-    text = read_text(path)
+    text = read_text(path, _MAX_BYTES)
     read = next(read for sign, read in _READERS if re.search(sign, text, re.MULTILINE))
     try:
         if camera and read not in (_kalibr, _opencv):
@@ -220,7 +220,7 @@ def _camera_info(text: str, path: str | Path, camera: str) -> tuple[Samples, str
 
 
 _READERS = (
-    (r'^\s*[\'"]?lensmodel[\'"]?\s*:', _mrcal),
+    (r'^[ \t]*[\'"]?lensmodel[\'"]?\s*:', _mrcal),
     (r'^[ \t]+camera_model\s*:', _kalibr),
     (r'^#.*polynomial coefficients', _ocam),
     (r'^%YAML|<opencv_storage>', _opencv),
