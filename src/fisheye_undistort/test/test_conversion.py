@@ -1,5 +1,6 @@
 """Calibrations of other programs: ours must be where theirs is."""
 
+import cv2
 import numpy as np
 import pytest
 from conftest import fisheye
@@ -7,7 +8,10 @@ from foreign_lenses import foreign_lens
 
 from fisheye_core.errors import CameraFileError, FisheyeError
 from fisheye_geometry.camera_file import Camera, read_camera
+from fisheye_undistort.fit.sheet_model import intrinsics_of
 from fisheye_undistort.foreign.conversion import convert
+from fisheye_undistort.foreign.foreign_models import fisheye as foreign_fisheye
+from fisheye_undistort.foreign.lens_samples import samples_of_projection
 from fisheye_undistort.foreign.written_formats import FORMATS, write_as
 from fisheye_undistort.report.lens_difference import LensDifference
 
@@ -109,6 +113,26 @@ def test_double_sphere_of_kalibr(tmp_path):
     conversion = convert(tmp_path / 'chain.yaml')
     assert conversion.good
     demand(conversion.lens, lambda rays: truth.project(rays)[0], 99)
+
+
+def test_a_file_of_mrcal_may_hold_what_it_was_fitted_to(tmp_path):
+    text = mrcal('LENSMODEL_STEREOGRAPHIC', [200, 200, 320, 240])
+    text = text.replace('}', f"    'optimization_inputs': b'{'0' * 400_000}',\n}}")
+    (tmp_path / 'camera.cameramodel').write_text(text)
+    assert convert(tmp_path / 'camera.cameramodel').worst_deg < CLOSE_DEG
+
+
+def test_a_lens_whose_axis_is_not_that_of_its_camera(monkeypatch):
+    lens = [200.0, 201.0, 320.0, 240.0, 0.02, -0.01, 0.003, -0.001]
+    rotation = cv2.Rodrigues(np.radians([3.0, -2.0, 1.0]))[0]
+    project = foreign_fisheye(*lens[:4], lens[4:])
+    samples = samples_of_projection(lambda rays: project(rays @ rotation.T), SIZE)
+    reader = 'fisheye_undistort.foreign.conversion.read_foreign'
+    monkeypatch.setattr(reader, lambda *_: (samples, 'a spline'))
+    conversion = convert('spline.cameramodel')
+    assert conversion.worst_deg < 1e-3
+    assert np.allclose(intrinsics_of(conversion.lens), lens, atol=1e-3)
+    assert str(conversion).endswith('degrees; the camera is turned by 3.7 degrees')
 
 
 def test_ocam(tmp_path):

@@ -3,16 +3,19 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+import cv2
 import numpy as np
 from scipy.optimize import least_squares
 
 from fisheye_geometry.lens import FisheyeLens
-from fisheye_undistort.fit.sheet_model import INTRINSICS, lens_of, project
+from fisheye_undistort.fit.sheet_model import INTRINSICS, lens_of, pixels_of
 from fisheye_undistort.foreign.foreign_files import read_foreign
 from fisheye_undistort.foreign.lens_samples import Samples
 
 _GOOD_DEG = 0.1
-"""A conversion that is off by more is told to be poor."""
+"""A conversion that is off by more is told to be poor, and a camera that turns by more to turn."""
+_TURN = slice(len(INTRINSICS), None)
+"""Rotation vector among the unknowns, rad: the z of a spline need not be the axis of the lens."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +32,8 @@ class Conversion:
         How far the lens is from that where the picture shows anything.
     reach_deg
         Largest angle from the axis there.
+    turn_deg
+        Angle by which its camera is turned against that of the other one.
     """
 
     lens: FisheyeLens
@@ -37,6 +42,7 @@ class Conversion:
     worst_px: float
     worst_deg: float
     reach_deg: float
+    turn_deg: float
 
     @property
     def good(self) -> bool:
@@ -44,10 +50,13 @@ class Conversion:
         return self.worst_deg <= _GOOD_DEG
 
     def __str__(self):
+        turned = f'; the camera is turned by {self.turn_deg:.1f} degrees'
+        if self.turn_deg <= _GOOD_DEG:
+            turned = ''
         return (
             f'converted from {self.model}: off by {self.rms_px:.3f} px rms, '
             f'{self.worst_px:.2f} px and {self.worst_deg:.3f} degrees at most, '
-            f'out to {self.reach_deg:.0f} degrees'
+            f'out to {self.reach_deg:.0f} degrees{turned}'
         )
 
 
@@ -66,32 +75,35 @@ def convert(path: str | Path, camera: str = '') -> Conversion:
     """
     samples, model = read_foreign(path, camera)
     unknowns = _fit(samples)
-    lens = lens_of(unknowns, samples.size)
-    off_px = np.linalg.norm(project(unknowns, samples.rays)[0] - samples.pixels, axis=-1)
+    lens, turned = lens_of(unknowns, samples.size), _turned(samples.rays, unknowns)
+    off_px = np.linalg.norm(pixels_of(unknowns, turned) - samples.pixels, axis=-1)
     rays, seen = lens.unproject(samples.pixels)
-    apart = np.linalg.norm(np.where(seen[:, None], rays, -samples.rays) - samples.rays, axis=-1)
+    apart = np.linalg.norm(np.where(seen[:, None], rays, -turned) - turned, axis=-1)
     return Conversion(
         lens,
         model,
         float(np.sqrt(np.mean(off_px**2))),
         float(off_px.max()),
         float(np.degrees(2 * np.arcsin((apart / 2).clip(0, 1)).max())),
-        float(np.degrees(np.arccos(samples.rays[:, 2].clip(-1, 1)).max())),
+        float(np.degrees(np.arccos(turned[:, 2].clip(-1, 1)).max())),
+        float(np.degrees(np.linalg.norm(unknowns[_TURN]))),
     )
 
 
 def _fit(samples: Samples) -> np.ndarray:
-    """Return the intrinsics (8,) nearest to samples."""
+    """Return the intrinsics nearest to samples, and how the camera is turned for them, (11,)."""
     angle = np.arccos(samples.rays[:, 2].clip(-1, 1))
     center = samples.pixels[np.argmin(angle)]
     radius = np.linalg.norm(samples.pixels - center, axis=-1)
     focal = float(np.sum(radius * angle) / np.sum(angle**2))
-    start = np.array([focal, focal, *center, 0, 0, 0, 0], float)
+    start = np.array([focal, focal, *center, *[0.0] * 7])
 
     def residuals(unknowns):
-        return (project(unknowns, samples.rays)[0] - samples.pixels).ravel()
+        turned = _turned(samples.rays, unknowns)
+        return (pixels_of(unknowns, turned) - samples.pixels).ravel()
 
-    def jacobian(unknowns):
-        return project(unknowns, samples.rays)[1].reshape(-1, len(INTRINSICS))
+    return least_squares(residuals, start, method='lm', x_scale='jac').x
 
-    return least_squares(residuals, start, jacobian, method='lm', x_scale='jac').x
+
+def _turned(rays: np.ndarray, unknowns: np.ndarray) -> np.ndarray:
+    return rays @ cv2.Rodrigues(unknowns[_TURN])[0].T
