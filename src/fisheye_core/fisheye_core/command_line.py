@@ -2,6 +2,7 @@
 
 import argparse
 import os
+import shutil
 import sys
 from collections.abc import Callable
 from typing import NoReturn
@@ -47,5 +48,15 @@ def exit_code(name: str, command: Callable[[], int]) -> int:
 
 
 def show_progress(line: str, width: int) -> None:
-    """Show how far a command has come, on the same line as before, cut or filled to a width."""
+    """Show how far a command has come, on the same line as before.
+
+    Parameters
+    ----------
+    line
+        What to show.
+    width
+        Characters to which it is cut or filled; fewer where the terminal has fewer, on which it
+        would go on in a new line each time.
+    """
+    width = min(width, shutil.get_terminal_size().columns - 1)
     print(f'\r{line:{width}.{width}}', end='', file=sys.stderr, flush=True)

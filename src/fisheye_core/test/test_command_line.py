@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from fisheye_core.command_line import CommandParser, exit_code
+from fisheye_core.command_line import CommandParser, exit_code, show_progress
 from fisheye_core.errors import SettingError, SourceError
 
 LINES = 100_000
@@ -45,6 +45,15 @@ def test_what_ends_a_command_is_its_code(command, code, said, capsys):
 def test_words_that_are_not_known_are_refused():
     with pytest.raises(SettingError, match=r'unrecognized arguments: --far \(see look --help\)'):
         CommandParser(prog='look').parse_args(['--far'])
+
+
+@pytest.mark.parametrize(
+    ('columns', 'shown'), [('', '\rsix views  '), ('80', '\rsix views  '), ('6', '\rsix v')]
+)
+def test_progress_stays_on_one_line_of_the_terminal(columns, shown, monkeypatch, capsys):
+    monkeypatch.setenv('COLUMNS', columns)
+    show_progress('six views', 11)
+    assert capsys.readouterr().err == shown
 
 
 def test_a_reader_that_leaves_ends_a_command_without_a_word():
