@@ -1,5 +1,7 @@
 """Collects calibration views from a live image topic."""
 
+import sys
+
 from rclpy.node import Node
 
 from fisheye_bridge.topics import ImageSubscription
@@ -23,6 +25,8 @@ class CollectNode(Node):
     ----------
     count : int
         Pictures that came.
+    error : SettingError or None
+        Why no picture can be searched for the target.
     """
 
     def __init__(self, topic: str, gathering: LiveGathering, half: str = '', **kwargs):
@@ -30,39 +34,53 @@ class CollectNode(Node):
         self._gathering = gathering
         self._half = half
         self.count = 0
+        self.error: SettingError | None = None
         self._subscription = ImageSubscription(self, topic, self._look)
 
     def _look(self, image, encoding, header):
         self.count += 1
         gray = cut(converted(image, encoding, 'mono8'), self._half)
-        self._gathering.add(NamedPicture(f'picture {self.count}', gray, moving=True))
-        show_progress(self._gathering.progress(), _LINE)
+        try:
+            self._gathering.add(NamedPicture(f'picture {self.count}', gray, moving=True))
+        except SettingError as error:
+            self.error = error
+        else:
+            show_progress(self._gathering.progress(), _LINE)
 
 
 def collect(topic: str, gathering: LiveGathering, views: int, half: str = '') -> None:
-    """Collect views from a topic until there are enough, or until Ctrl-C.
+    """Collect views from a topic until there are enough, until it falls silent or until Ctrl-C.
 
     Raises
     ------
     SourceError
         If no picture comes.
     SettingError
-        If fewer than one view is asked for, or the topic's name is not possible.
+        If fewer than one view is asked for, the topic's name is not possible, or no picture can
+        be searched for the target.
     """
     if views < 1:
         raise SettingError(f'{views} views are to be collected; expected at least 1')
 
+    silent = ''
+
     def see(node: CollectNode) -> None:
-        while len(gathering.collector.views) < views:
-            _wait_for_picture(node, topic)
+        nonlocal silent
+        while len(gathering.collector.views) < views and not silent:
+            silent = _wait_for_picture(node, topic)
 
     watch(see, CollectNode, topic, gathering, half)
+    if silent:
+        print(f'{silent}; going on with {len(gathering.collector.views)} views', file=sys.stderr)
 
 
-def _wait_for_picture(node: CollectNode, topic: str) -> None:
+def _wait_for_picture(node: CollectNode, topic: str) -> str:
+    """Wait for the next picture; return a sentence if no more come, '' if one came."""
     before = node.count
-    if not spin_until(node, lambda: node.count > before, _LONGEST_WAIT_S):
-        raise SourceError(
-            f'no picture came on {node.resolve_topic_name(topic)} for '
-            f'{_LONGEST_WAIT_S:.0f} s; see `ros2 topic list`'
-        )
+    came = spin_until(node, lambda: node.count > before, _LONGEST_WAIT_S)
+    if node.error:
+        raise node.error
+    silent = f'no picture came on {node.resolve_topic_name(topic)} for {_LONGEST_WAIT_S:.0f} s'
+    if not node.count:
+        raise SourceError(f'{silent}; see `ros2 topic list`')
+    return '' if came else silent

@@ -20,7 +20,10 @@ TOPIC = '/collect_node_test/image_raw'
 
 @pytest.fixture
 def waving(paper_pictures):
-    """Publish each photograph until the next comes, as somebody who waves a sheet."""
+    """Publish each photograph until the next comes, as somebody who waves a sheet.
+
+    Gives the event that ends it.
+    """
     context = rclpy.Context()
     rclpy.init(context=context)
     node = rclpy.create_node('waving', context=context)
@@ -36,7 +39,7 @@ def waving(paper_pictures):
 
     thread = threading.Thread(target=wave)
     thread.start()
-    yield
+    yield ended
     ended.set()
     thread.join()
     node.destroy_node()
@@ -52,6 +55,29 @@ def test_views_are_collected_from_a_topic(waving, capsys):
     told = capsys.readouterr().err
     assert f'{VIEWS} views' in told
     assert 'of the picture covered' in told
+
+
+def test_what_was_collected_until_the_camera_stops_is_used(waving, monkeypatch, capsys):
+    monkeypatch.setattr(collect_node, '_LONGEST_WAIT_S', 2.0)
+
+    class Stopping(LiveGathering):
+        def add(self, picture):
+            super().add(picture)
+            if len(self.collector.views) == 2:
+                waving.set()
+
+    gathering = Stopping(Detector(STANDARD['circles']))
+    collect(TOPIC, gathering, 100)
+    count = len(gathering.gathered().collector.finish())
+    assert count >= 2
+    told = f'no picture came on {TOPIC} for 2 s; going on with {count} views\n'
+    assert capsys.readouterr().err.endswith(told)
+
+
+def test_limits_that_no_picture_can_be_searched_with_end_it(waving):
+    gathering = LiveGathering(Detector(STANDARD['circles'], 500, 100))
+    with pytest.raises(SettingError, match='particles of 500 to 100 px are to be kept'):
+        collect(TOPIC, gathering, VIEWS)
 
 
 def test_nobody_publishes(monkeypatch):
