@@ -100,6 +100,22 @@ def replace_regular(path: str | Path, text: str, *, mode: int = 0o644) -> None:
         raise
 
 
+def check_replaceable(path: str | Path) -> None:
+    """Refuse, before there is anything to write, what `replace_regular` cannot replace.
+
+    Raises
+    ------
+    OSError
+        As `replace_regular`.
+    """
+    path = Path(os.path.realpath(path))
+    with suppress(FileNotFoundError):
+        _check_regular(path.stat().st_mode)
+    folder = next(folder for folder in path.parents if folder.exists())
+    with tempfile.TemporaryFile(dir=folder):
+        pass
+
+
 def _temporary_beside(path: Path) -> tuple[TextIO, str]:
     """Open a new file that is locked as long as it is open: somebody writes it."""
     while True:

@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from fisheye_core.errors import FileAccessError
-from fisheye_core.regular_file import read_regular, replace_regular
+from fisheye_core.regular_file import check_replaceable, read_regular, replace_regular
 from fisheye_core.yaml_file import read_mapping, write_mapping
 
 
@@ -31,6 +31,29 @@ def test_only_regular_files_are_read_and_replaced(odd, kind):
         read_mapping(odd[kind])
     with pytest.raises(FileAccessError, match=f'cannot be written: {told}'):
         write_mapping(odd[kind], {'a': 1})
+
+
+@pytest.mark.parametrize(
+    ('place', 'told'),
+    [
+        ('folder', 'it is a folder; expected a regular file'),
+        ('fifo', 'it is a FIFO; expected a regular file'),
+        ('file/a.yaml', 'Not a directory'),
+        ('/proc/nowhere/a.yaml', 'proc'),
+    ],
+)
+def test_what_cannot_be_replaced_is_refused_before(place, told, odd, tmp_path):
+    (tmp_path / 'file').touch()
+    with pytest.raises(OSError, match=told):
+        check_replaceable(tmp_path / place)
+
+
+@pytest.mark.parametrize('place', ['file', 'new/and/newer/a.yaml'])
+def test_looking_whether_a_file_can_be_replaced_leaves_no_trace(place, tmp_path):
+    (tmp_path / 'file').write_text('old')
+    check_replaceable(tmp_path / place)
+    assert [path.name for path in tmp_path.rglob('*')] == ['file']
+    assert (tmp_path / 'file').read_text() == 'old'
 
 
 def test_a_link_stays_and_its_file_is_replaced(tmp_path):

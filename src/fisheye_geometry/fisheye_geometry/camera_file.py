@@ -20,7 +20,7 @@ from fisheye_geometry.calibration_ini import is_ini, parse_ini
 from fisheye_geometry.camera import IDENTITY, Camera, Readout, camera_from
 from fisheye_geometry.lens import make_lens
 
-__all__ = ['Camera', 'read_camera', 'write_camera']
+__all__ = ['Camera', 'check_camera_name', 'read_camera', 'write_camera']
 
 _MATRICES = {
     'k': 'camera_matrix',
@@ -75,8 +75,7 @@ def write_camera(path: str | Path, camera: Camera, comment: str = '') -> None:
     FileAccessError
         If the file cannot be written, or its name says that it is an INI file.
     """
-    if Path(path).suffix.lower() == '.ini':
-        raise FileAccessError(path, 'written as INI', 'expected a name with .yaml')
+    check_camera_name(path)
     lens = camera.lens
     write_mapping(
         path,
@@ -92,6 +91,18 @@ def write_camera(path: str | Path, camera: Camera, comment: str = '') -> None:
         },
         comment,
     )
+
+
+def check_camera_name(path: str | Path) -> None:
+    """Refuse a name by which `write_camera` cannot write.
+
+    Raises
+    ------
+    FileAccessError
+        If it says that it is an INI file.
+    """
+    if Path(path).suffix.lower() == '.ini':
+        raise FileAccessError(path, 'written as INI', 'expected a name with .yaml')
 
 
 def _matrix(rows: int, cols: int, data: Iterable[float]) -> dict[str, Any]:

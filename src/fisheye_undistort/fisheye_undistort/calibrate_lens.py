@@ -16,7 +16,7 @@ from fisheye_undistort.detect.pictures import read_pictures
 from fisheye_undistort.fit.angle_map import lit_part
 from fisheye_undistort.fit.calibration import calibrate
 from fisheye_undistort.foreign.conversion import convert
-from fisheye_undistort.foreign.written_formats import write_as
+from fisheye_undistort.foreign.written_formats import check_output, write_as
 from fisheye_undistort.report.calibrated_angle import report_path
 from fisheye_undistort.report.lens_difference import LensDifference
 from fisheye_undistort.report.report import CalibrationReport
@@ -65,11 +65,18 @@ def _compare(options: argparse.Namespace) -> int:
 
 
 def _convert(options: argparse.Namespace) -> int:
+    output = _output(options)
     conversion = convert(options.convert, options.camera)
-    output = options.output or Path(f'{options.name}.yaml')
     write_as(options.to, output, Camera(options.name, conversion.lens), str(conversion))
     print(f'{conversion}\nwritten  {output}')
     return GOOD if conversion.good else POOR
+
+
+def _output(options: argparse.Namespace) -> Path:
+    """Return the file to write, after a look whether it can be."""
+    output = options.output or Path(f'{options.name}.yaml')
+    check_output(options.to, output)
+    return output
 
 
 def _collected(options: argparse.Namespace) -> Gathered:
@@ -101,6 +108,7 @@ def _gathered(options: argparse.Namespace) -> Gathered:
 
 
 def _calibrate(options: argparse.Namespace) -> int:
+    output = _output(options)
     gathered = _collected(options) if options.topic else _gathered(options)
     collector = gathered.collector
     calibration = calibrate(
@@ -112,7 +120,6 @@ def _calibrate(options: argparse.Namespace) -> int:
     report = CalibrationReport(
         calibration, collector.brightest, collector.skipped, options.seam_deg
     )
-    output = options.output or Path(f'{options.name}.yaml')
     write_as(options.to, output, Camera(options.name, calibration.lens), calibrated_line(report))
     write_report(report_path(output), report, options.name)
     if gathered.note:

@@ -170,6 +170,24 @@ def test_a_plot_that_cannot_be_is_refused_before_the_work_begins(name, tmp_path,
     assert 'cannot be written' in told
 
 
+@pytest.mark.parametrize('work', [('never read.png',), ('--convert', 'never read.yaml')])
+@pytest.mark.parametrize(
+    ('name', 'reason'),
+    [
+        ('left.ini', 'expected a name with .yaml'),
+        ('.', 'a folder'),
+        ('file/a.yaml', 'Not a dir'),
+    ],
+)
+def test_a_file_that_cannot_be_is_refused_before_the_work_begins(
+    work, name, reason, tmp_path, capsys
+):
+    (tmp_path / 'file').touch()
+    told = refused(capsys, *work, '-o', tmp_path / name)
+    assert 'cannot be written' in told
+    assert reason in told
+
+
 def test_a_plot_that_fails_leaves_the_camera(shots, tmp_path, capsys):
     output, plot = tmp_path / 'camera.yaml', tmp_path / 'folder.png'
     plot.mkdir()

@@ -7,9 +7,9 @@ import cv2
 import numpy as np
 
 from fisheye_core.errors import FileAccessError
-from fisheye_core.regular_file import replace_regular
+from fisheye_core.regular_file import check_replaceable, replace_regular
 from fisheye_core.yaml_file import write_mapping
-from fisheye_geometry.camera_file import Camera, write_camera
+from fisheye_geometry.camera_file import Camera, check_camera_name, write_camera
 
 
 def write_as(kind: str, path: Path, camera: Camera, comment: str = '') -> None:
@@ -21,6 +21,22 @@ def write_as(kind: str, path: Path, camera: Camera, comment: str = '') -> None:
         If the file cannot be written.
     """
     _WRITERS[kind](path, camera, comment)
+
+
+def check_output(kind: str, path: Path) -> None:
+    """Refuse, before there is a calibration, what `write_as` cannot write.
+
+    Raises
+    ------
+    FileAccessError
+        As `write_as`.
+    """
+    if kind == 'ros':
+        check_camera_name(path)
+    try:
+        check_replaceable(path)
+    except OSError as error:
+        raise FileAccessError(path, 'written', error.strerror) from error
 
 
 def _kalibr(path: Path, camera: Camera, comment: str) -> None:
