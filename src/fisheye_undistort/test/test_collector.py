@@ -3,8 +3,10 @@ import pytest
 
 from fisheye_core.errors import CalibrationError, ImageFormatError
 from fisheye_undistort.detect.collector import Collector
+from fisheye_undistort.detect.detection import Detector
 from fisheye_undistort.detect.pictures import NamedPicture
 from fisheye_undistort.fit.estimate import TargetView
+from fisheye_undistort.target.target import STANDARD
 
 GRID = np.stack(np.meshgrid(np.arange(3), np.arange(3)), axis=-1).reshape(-1, 2) * 40.0
 SIZE = (640, 480)
@@ -20,6 +22,7 @@ def collector():
             raise CalibrationError('nothing there')
         return TargetView(name, GRID + np.array([x, y]), np.arange(9))
 
+    detect.target = STANDARD['circles']
     return Collector(detect)
 
 
@@ -49,6 +52,24 @@ def test_a_moving_target_must_rest(collector):
     assert collector.add(shot('3', 142, 100, moving=True))
     assert not collector.add(shot('4', 142, 100, moving=True))
     assert collector.skipped == {}
+
+
+@pytest.mark.parametrize('kind', ['charuco', 'aprilgrid'])
+def test_points_that_come_and_go_do_not_move_a_sheet_with_markers(kind):
+    target = STANDARD[kind]
+    points = target.points_mm[:, :2] * 1.6 + (320, 240)
+    collector = Collector(Detector(target))
+
+    def look(first, shift=0):
+        ids = np.arange(first, len(points))
+        name = f'{first} {shift}'
+        return collector.add(shot(name, moving=True), TargetView(name, points[ids] + shift, ids))
+
+    assert [look(first) for first in (0, 4, 0, 8, 4)] == [False, True, False, False, False]
+    assert collector.state == 'shows the target where 4 0 does'
+    assert not look(0, 30)
+    assert collector.state == 'the target moves'
+    assert look(8, 30)
 
 
 def test_progress_tells_views_and_coverage(collector):

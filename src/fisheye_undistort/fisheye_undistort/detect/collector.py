@@ -10,6 +10,7 @@ from fisheye_undistort.detect.looking import Found, look_at
 from fisheye_undistort.detect.pictures import NamedPicture
 from fisheye_undistort.fit.angle_map import lit_part, picture_grid, place_name
 from fisheye_undistort.fit.estimate import TargetView
+from fisheye_undistort.target.target import Target
 
 _MOVED = 0.01
 """A view is new where the target lies this share of the picture's width from all before."""
@@ -82,7 +83,7 @@ class Collector:
         if isinstance(view, str):
             return view
         self._found += 1
-        place = self._last = _place(view)
+        place = self._last = _place(view, self._detector.target)
         if picture.moving and not _close(place, before, _STILL * self.size[0]):
             return 'the target moves'
         for other, kept in zip(self._places, self.views, strict=True):
@@ -154,12 +155,25 @@ class Collector:
         return f'; show it at the {" and the ".join(name for name, _ in places)}' if places else ''
 
 
-def _place(view: TargetView) -> np.ndarray:
-    """Where a view's points lie and how they are spread, (5,) px, whatever their order."""
+def _place(view: TargetView, target: Target) -> np.ndarray:
+    """Where a view's points lie, px, in rows to be compared with those of another view.
+
+    Markers tell which point is which, and each point of the target has a row, NaN where it is not
+    seen: points come and go. Of other targets, whose order may change, the only row has their mean
+    and how they are spread.
+    """
+    if target.has_markers:
+        rows = np.full((len(target.cells), 2), np.nan)
+        rows[view.ids] = view.points_px
+        return rows
     spread = np.cov(view.points_px.T)
     scale = np.sqrt(np.trace(spread))
-    return np.concatenate([view.points_px.mean(axis=0), spread[np.triu_indices(2)] / scale])
+    return np.concatenate([view.points_px.mean(axis=0), spread[np.triu_indices(2)] / scale])[None]
 
 
 def _close(place: np.ndarray, other: np.ndarray | None, limit_px: float) -> bool:
-    return other is not None and float(np.linalg.norm(place - other)) < limit_px
+    if other is None:
+        return False
+    apart = np.linalg.norm(place - other, axis=-1)
+    in_both = apart[np.isfinite(apart)]
+    return len(in_both) > 0 and float(in_both.mean()) < limit_px
