@@ -1,3 +1,5 @@
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -123,6 +125,24 @@ def test_the_brightest_and_an_example_are_remembered(collector):
     assert collector.brightest[5, 5] == 250
     assert collector.brightest[0, 0] == 150
     assert collector.example.shape == SIZE[::-1]
+
+
+def test_progress_costs_no_more_with_more_views(collector):
+    def peak_bytes():
+        tracemalloc.start()
+        collector.progress()
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return peak
+
+    first = shot('first', 30, 30)
+    first.gray[1:] = 200
+    collector.add(first)
+    before = peak_bytes()
+    for number in range(1, 40):
+        collector.add(shot(str(number), 30 + 12 * number, 100))
+    assert len(collector.views) == 40
+    assert peak_bytes() < 2 * before
 
 
 def test_where_to_show_it_next_is_told_where_the_lens_sees_anything(collector):

@@ -50,6 +50,7 @@ class Collector:
         self._last: np.ndarray | None = None
         self._found = self.looks = 0
         self._largest = 0.0
+        self._apart_px: np.ndarray | float = np.inf
         self.views: list[TargetView] = []
         self.state = ''
         self.skipped: dict[str, str] = {}
@@ -106,6 +107,8 @@ class Collector:
     def _keep(self, view, place, picture):
         self.views.append(view)
         self._places.append(place)
+        offsets = picture_grid(self.size)[:, :, None] - view.points_px
+        self._apart_px = np.minimum(self._apart_px, np.linalg.norm(offsets, axis=-1).min(axis=-1))
         extent = float(np.prod(np.ptp(view.points_px, axis=0)))
         if extent > self._largest:
             self._largest, self.example = extent, picture.gray
@@ -140,15 +143,12 @@ class Collector:
         size = np.array(self.size)
         cells = (points / size * _CELLS).astype(int).clip(0, np.array(_CELLS) - 1)
         share = len(np.unique(cells, axis=0)) / np.prod(_CELLS)
-        return (
-            f'{len(self.views)} views, {share:.0%} of the picture covered{self._missing(points)}'
-        )
+        return f'{len(self.views)} views, {share:.0%} of the picture covered{self._missing()}'
 
-    def _missing(self, points: np.ndarray) -> str:
+    def _missing(self) -> str:
         """Name the places where the target should be shown next."""
-        grid = picture_grid(self.size)[lit_part(self.brightest)]
-        apart = np.linalg.norm(grid[:, None] - points, axis=-1).min(axis=1)
-        far = grid[apart > _COVERED * self.size[0]]
+        is_missing = lit_part(self.brightest) & (self._apart_px > _COVERED * self.size[0])
+        far = picture_grid(self.size)[is_missing]
         places = Counter(place_name(x, y, self.size[::-1]) for x, y in far).most_common(
             _MOST_PLACES
         )
