@@ -7,6 +7,7 @@ from conftest import seen_exactly
 from rendered_view import facing_pose, scattered_poses
 
 from fisheye_core.errors import FileAccessError
+from fisheye_geometry.camera_file import Camera, read_camera, write_camera
 from fisheye_undistort.fit.angle_map import lit_part
 from fisheye_undistort.fit.calibration import calibrate
 from fisheye_undistort.fit.estimate import TargetView
@@ -132,15 +133,24 @@ def test_programs_and_people_can_read_how_far_it_is_calibrated(good, tmp_path):
     assert facts['good']
     assert len(facts['views']) == 14
     assert np.shape(facts['covariance']) == (11, 11)
-    assert abs(calibrated_deg(path) - good.certainty.calibrated_deg) < 0.01
+    lens = good.calibration.lens
+    write_camera(path, Camera('left', lens))
+    known_deg = calibrated_deg(path, read_camera(path).lens)
+    assert abs(known_deg - good.certainty.calibrated_deg) < 0.01
+    for change in ({'focal_x_px': 1.0}, {'width': 320}, {'distortion': (0.1,) * 4}):
+        assert calibrated_deg(path, replace(lens, **change)) is None
+    text = report_path(path).read_text()
+    for key, wrong in (('width', '"wide"'), ('focal_x_px', '-1'), ('calibrated_deg', '"far"')):
+        report_path(path).write_text(text.replace(f'"{key}": ', f'"{key}": {wrong}, "was": '))
+        assert calibrated_deg(path, lens) is None
     assert f'out to {good.certainty.calibrated_deg:.1f} degrees' in calibrated_line(good)
 
 
-@pytest.mark.parametrize('content', ['', '[]', '{"calibrated_deg": "far"}', 'no JSON'])
-def test_a_report_that_says_nothing_is_none(content, tmp_path):
+@pytest.mark.parametrize('content', ['', '[]', '{"calibrated_deg": 80}', 'no JSON'])
+def test_a_report_that_says_nothing_is_none(content, paper_lens, tmp_path):
     (tmp_path / 'left.report.json').write_text(content)
-    assert calibrated_deg(tmp_path / 'left.yaml') is None
-    assert calibrated_deg(tmp_path / 'right.yaml') is None
+    assert calibrated_deg(tmp_path / 'left.yaml', paper_lens) is None
+    assert calibrated_deg(tmp_path / 'right.yaml', paper_lens) is None
 
 
 def test_what_was_assumed_is_told(paper_lens):

@@ -57,7 +57,7 @@ class LocalCamera(CameraInput):
         camera = self._calibration(reader)
         self._camera, self._seen, self._fault = camera, LensWithImageCircle(camera.lens), ''
         file = calibration_path(own.camera_info_url, own.camera_name)
-        self._calibrated_deg = calibrated_deg(file) if file else None
+        self._calibrated_deg = calibrated_deg(file, camera.lens) if file else None
         self._broken = DropCounter(node, f'a picture of {name}', f'{name} broken')
         self.place(node.settings)
         reader.add(name, self._take)
