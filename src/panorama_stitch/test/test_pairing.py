@@ -163,6 +163,56 @@ def test_frames_that_come_late_lose_nothing(rates_hz, phase, seed):
     assert pair_frames(FramePairing, cameras, seconds=10.0, seed=seed).share > ENOUGH
 
 
+@pytest.mark.parametrize('late_ms', [280, 1000, 2500])
+@pytest.mark.parametrize('rates_hz', [(30, 30), (60, 60), (60, 30), (30, 25)])
+def test_a_camera_that_comes_late_by_more_loses_no_more_than_its_lag(rates_hz, late_ms):
+    first, second = rates_hz
+    cameras = [CameraTiming(first, 0.0, 1.0), CameraTiming(second, 3.0, 1.0, late_ms=late_ms)]
+    paired = pair_frames(FramePairing, cameras, seconds=10.0)
+    assert len(paired.groups) > ENOUGH * second * (10.0 - late_ms / 1000) - 1
+    assert paired.worst_skew_ms < SHIFT * 1000 / first + 2.0
+
+
+def waiting(pairing, camera):
+    """How many frames of a camera wait: those that are dropped at once."""
+    before = pairing.unpaired[camera]
+    pairing.clear()
+    return pairing.unpaired[camera] - before
+
+
+@pytest.mark.parametrize(('late_s', 'frames'), [(0, 8), (1, 33), (2.9, 91), (4, 8), (37, 8)])
+def test_frames_wait_as_long_as_a_camera_is_late_up_to_3_s(late_s, frames):
+    pairing = FramePairing(('left', 'right'), 50 * MS)
+    for k in range(200):
+        pairing.add('left', k * PERIOD, None)
+        pairing.add('right', k * PERIOD - round(late_s * 1000) * MS, None)
+    for k in range(200, 300):
+        pairing.add('left', k * PERIOD, None)
+    assert waiting(pairing, 'left') == pytest.approx(frames, abs=1)
+
+
+def test_who_waited_for_a_camera_that_died_lets_go():
+    pairing = FramePairing(('left', 'right'), 50 * MS)
+    for k in range(200):
+        pairing.add('left', k * PERIOD, None)
+        pairing.add('right', (k - 60) * PERIOD, None)
+    for k in range(200, 600):
+        pairing.add('left', k * PERIOD, None)
+    assert waiting(pairing, 'left') == 8
+
+
+@pytest.mark.parametrize(('late', 'is_full'), [(20, False), (40, True)])
+def test_what_waits_has_bounded_room(late, is_full):
+    pairing, groups = FramePairing(('left', 'right'), 50 * MS), 0
+    for k in range(300):
+        pairing.add('left', k * PERIOD, None, 10_000_000)
+        groups += bool(pairing.add('right', (k - late) * PERIOD, None, 10_000_000))
+    assert pairing.is_full == is_full
+    assert bool(groups) != is_full
+    assert pairing.late_and_early == ('right', 'left')
+    assert waiting(pairing, 'left') <= 30
+
+
 @given(phases, st.floats(0.0, 0.1), st.integers(0, 99))
 def test_a_lost_frame_costs_one_group(phase, lost, seed):
     cameras = [CameraTiming(30, 0.0, 1.0), CameraTiming(30, phase * 33.0, 1.0, lost)]

@@ -14,6 +14,7 @@ from pipeline_line import DEADLINE_S, LENS, SETTINGS, STEP_NS, YAW, Line, overla
 from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.remap import RemapTable
 from panorama_stitch.compose.compositor import Compositor
+from panorama_stitch.pipeline import pairing
 from panorama_stitch.pipeline.metrics import economy_sentence, metrics, unpaired_sentence
 
 TABLES = 3
@@ -163,6 +164,15 @@ def test_cameras_of_different_clocks_are_paired_by_arrival(make_line, pictures):
     assert line.published[-1][0] <= line.stamp_ns - 37 * 10**9, 'the older stamp'
     line.pipeline.apply(SETTINGS)
     line.feed(pictures, lambda: line.published[-1][0] > 0, 'pairs by stamp again')
+
+
+def test_a_camera_that_comes_too_late_is_named(make_line, pictures, monkeypatch):
+    monkeypatch.setattr(pairing, 'ROOM_BYTES', 1_000_000)
+    line = make_line()
+    end = time.monotonic() + 0.5
+    stamps_apart(line, pictures, -2.0, lambda: time.monotonic() > end, 'time for a pair')
+    sentence = unpaired_sentence(line.pipeline)
+    assert 'right comes 2000 ms later than left, more than can wait in ' in sentence
 
 
 def test_a_lens_that_changes_with_each_frame_stops_no_panorama(make_line, pictures):

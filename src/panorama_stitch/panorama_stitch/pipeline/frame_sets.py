@@ -145,7 +145,7 @@ class FrameSets:
         """Pair a frame; return the frame set that it completes."""
         by_stamp = self._settings.pair_by == 'stamp'
         when_ns = frame.stamp_ns if by_stamp else monotonic_ns()
-        paired = self.pairing.add(camera, when_ns, frame)
+        paired = self.pairing.add(camera, when_ns, frame, frame.image.nbytes)
         if paired is None:
             return None
         images, stamps_ns = zip(*(member.frame for member in paired), strict=True)

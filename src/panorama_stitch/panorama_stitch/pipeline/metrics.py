@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from panorama_stitch.pipeline.pairing import LONGEST_WAIT_NS, ROOM_BYTES
 from panorama_stitch.pipeline.stitch_pipeline import StitchPipeline
 
 _PERCENTILES = (50, 95, 99)
@@ -75,12 +76,22 @@ def unpaired_sentence(pipeline: StitchPipeline) -> str:
     sentence = (
         f'pictures come, but for {pipeline.frames.unpaired_s:.0f} s none that belong together'
     )
-    spread_s = pipeline.frames.pairing.spread_ns / 1e9
+    pairing = pipeline.frames.pairing
+    spread_s = pairing.spread_ns / 1e9
     if spread_s <= settings.max_pair_skew_s:
         return sentence
     limit = f'(max_pair_skew_s is {settings.max_pair_skew_s:g})'
     if settings.pair_by == 'arrival':
         return f'{sentence}: they arrive {spread_s:.3g} s apart {limit}'
+    if pairing.spread_ns <= LONGEST_WAIT_NS:
+        late, early = pairing.late_and_early
+        sentence += f': {late} comes {1e3 * spread_s:.0f} ms later than {early}'
+        if not pairing.is_full:
+            return sentence
+        return (
+            f'{sentence}, more than can wait in {ROOM_BYTES / 1e6:.0f} MB; smaller pictures or '
+            'fewer a second can'
+        )
     return (
         f'{sentence}: the stamps of the cameras are {spread_s:.3g} s apart {limit}; are their '
         'clocks equal? If they cannot be, pair_by:=arrival joins what arrives together'

@@ -5,6 +5,9 @@ that wait form a queue for each camera, and the heads of all queues are the next
 earliest head gives way to its successor only where that makes the group clearly tighter, whether
 the successor waits already or is only due. So no frame is refused for a doubtful gain, and a
 frame that gave way is gone: the other cameras' frames are bound to what comes next.
+
+Where the frames of one camera come later than those of another, as over a network, the other
+ones wait for as long as that has been seen to take.
 """
 
 from collections import deque
@@ -15,8 +18,14 @@ from typing import Any, NamedTuple
 
 from panorama_stitch.pipeline.frame_clock import FrameClock
 
-_WAITING = 8
-"""Frames of one camera that may wait for their partners: those of another may come late."""
+LONGEST_WAIT_NS = 3_000_000_000
+"""No frame waits longer for one that comes later; stamps farther apart are of other clocks."""
+ROOM_BYTES = 300_000_000
+"""For what waits of all cameras: at 30 Hz 2.7 s of one with 1280x960 px in colour."""
+_ALWAYS = 8
+"""Frames of each camera that may wait in any case."""
+_LAGS = 300
+"""Recent frames of all cameras of which it is remembered how late they came."""
 _CLEARLY = 0.6
 """Of a group's spread; a gain that is smaller, or within the jitter, is not worth a frame."""
 _SKEWS = 300
@@ -31,10 +40,11 @@ class Stamped(NamedTuple):
 
 
 class _Waiting(NamedTuple):
-    """A frame in a queue, and its stamp without the jitter."""
+    """A frame in a queue, its stamp without the jitter, and its size in memory."""
 
     stamped: Stamped
     smooth_ns: float
+    nbytes: int
 
 
 @dataclass
@@ -45,15 +55,13 @@ class _Track:
     clock: FrameClock = field(default_factory=FrameClock)
     unpaired: int = 0
 
-    def add(self, new: Stamped) -> None:
+    def add(self, new: Stamped, nbytes: int) -> None:
         is_later = self.clock.last_ns is None or new.stamp_ns > self.clock.last_ns
         smooth_ns = self.clock.tick(new.stamp_ns)
         if not is_later:
             # The clock jumped back: what waits belongs to another time.
             self.clear()
-        elif len(self.waiting) == _WAITING:
-            self.drop()
-        self.waiting.append(_Waiting(new, smooth_ns))
+        self.waiting.append(_Waiting(new, smooth_ns, nbytes))
 
     def drop(self) -> None:
         self.unpaired += 1
@@ -66,6 +74,10 @@ class _Track:
     @property
     def head(self) -> _Waiting:
         return self.waiting[0]
+
+    @property
+    def nbytes(self) -> int:
+        return sum(frame.nbytes for frame in self.waiting)
 
     def times_ns(self, near_ns: float) -> list[float]:
         """When the frames that wait were taken, and the one that is due nearest to a time."""
@@ -84,12 +96,16 @@ class FramePairing:
     ----------
     skews_ns : deque of int
         Largest difference of stamps within each of the recent groups.
+    is_full : bool
+        Whether a frame was dropped for want of room since the last group.
     """
 
     def __init__(self, cameras: Sequence[str], max_skew_ns: int):
         self._tracks = {camera: _Track() for camera in cameras}
         self.max_skew_ns = max_skew_ns
         self.skews_ns: deque[int] = deque(maxlen=_SKEWS)
+        self.is_full = False
+        self._lags_ns: deque[int] = deque(maxlen=_LAGS)
 
     @property
     def unpaired(self) -> dict[str, int]:
@@ -99,18 +115,34 @@ class FramePairing:
     @property
     def spread_ns(self) -> int:
         """How far apart the newest stamps of the cameras lie; 0 before all have one."""
-        stamps = (track.clock.last_ns for track in self._tracks.values())
-        newest = [stamp_ns for stamp_ns in stamps if stamp_ns is not None]
+        newest = self._newest_ns
         return max(newest) - min(newest) if len(newest) == len(self._tracks) else 0
+
+    @property
+    def late_and_early(self) -> tuple[str, str]:
+        """The cameras with the oldest and with the newest stamp, once all have one."""
+        by_stamp = sorted(self._tracks, key=lambda name: self._tracks[name].clock.last_ns or 0)
+        return by_stamp[0], by_stamp[-1]
 
     def clear(self) -> None:
         """Forget what waits."""
         for track in self._tracks.values():
             track.clear()
 
-    def add(self, camera: str, stamp_ns: int, frame: Any) -> list[Stamped] | None:
-        """Add a frame; return the group that it completes, in the order of the cameras."""
-        self._tracks[camera].add(Stamped(stamp_ns, frame))
+    def add(self, camera: str, stamp_ns: int, frame: Any, nbytes: int = 0) -> list[Stamped] | None:
+        """Add a frame; return the group that it completes, in the order of the cameras.
+
+        Parameters
+        ----------
+        camera, stamp_ns
+            Whose it is, and when it was taken.
+        frame
+            Anything.
+        nbytes
+            The memory that it takes while it waits.
+        """
+        self._tracks[camera].add(Stamped(stamp_ns, frame), nbytes)
+        self._make_room(camera, stamp_ns)
         tracks = list(self._tracks.values())
         while all(track.waiting for track in tracks):
             stamps = [track.head.stamped.stamp_ns for track in tracks]
@@ -121,8 +153,37 @@ class FramePairing:
                 loose.drop()
             else:
                 self.skews_ns.append(skew_ns)
+                self.is_full = False
                 return [track.waiting.popleft().stamped for track in tracks]
         return None
+
+    @property
+    def _newest_ns(self) -> list[int]:
+        """The newest stamp of each camera that has one."""
+        stamps = (track.clock.last_ns for track in self._tracks.values())
+        return [stamp_ns for stamp_ns in stamps if stamp_ns is not None]
+
+    def _make_room(self, camera: str, stamp_ns: int) -> None:
+        """Drop what no camera is late enough for, and the oldest of what is too much.
+
+        Parameters
+        ----------
+        camera, stamp_ns
+            Whose frame came last, and when it was taken.
+        """
+        lag_ns = max(self._newest_ns) - stamp_ns
+        if lag_ns <= LONGEST_WAIT_NS:
+            self._lags_ns.append(lag_ns)
+        wait_ns = max(self._lags_ns, default=0) + self.max_skew_ns
+        oldest_ns = stamp_ns - min(wait_ns, LONGEST_WAIT_NS)
+        track, tracks = self._tracks[camera], self._tracks.values()
+        while len(track.waiting) > _ALWAYS and track.head.stamped.stamp_ns < oldest_ns:
+            track.drop()
+        while long := [track for track in tracks if len(track.waiting) > _ALWAYS]:
+            if sum(track.nbytes for track in tracks) <= ROOM_BYTES:
+                return
+            max(long, key=lambda track: track.nbytes).drop()
+            self.is_full = True
 
 
 def _loose(tracks: Sequence[_Track]) -> _Track | None:

@@ -46,7 +46,7 @@ class RecordNode(Node):
     def _taker(self, name: str):
         def take(image: np.ndarray, encoding: str, header) -> None:
             gray = np.array(converted(image, encoding, 'mono8'))
-            group = self._pairing.add(name, ns_of(header.stamp), gray)
+            group = self._pairing.add(name, ns_of(header.stamp), gray, gray.nbytes)
             if group and self.error is None:
                 self._look([stamped.frame for stamped in group])
 
