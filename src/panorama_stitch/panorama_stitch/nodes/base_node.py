@@ -160,7 +160,7 @@ class PanoramaBase(Node):
             report.add(WARN, sentence)
         if sentence := economy_sentence(pipeline):
             report.add(OK, sentence)
-        if pipeline.frames.unpaired_s > self.settings.stale_after_s:
+        if pipeline.frames.unpaired_s:
             report.add(ERROR, unpaired_sentence(pipeline))
         ages_s = pipeline.frames.ages_s()
         all_stale = len(ages_s) == len(self.settings.cameras)

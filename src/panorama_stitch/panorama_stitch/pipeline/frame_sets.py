@@ -134,8 +134,13 @@ class FrameSets:
 
     @property
     def unpaired_s(self) -> float:
-        """How long ago the last frames belonged together, s; 0 while a camera is stale."""
-        return 0.0 if self.ages_s() else monotonic() - self._paired_s
+        """How long ago the last frames belonged together, s.
+
+        0 while a camera is stale, and for as long as a camera may be silent without being stale.
+        """
+        age_s = monotonic() - self._paired_s
+        is_long = age_s > self._stale.longest_limit_s(self._settings.stale_after_s)
+        return age_s if is_long and not self.ages_s() else 0.0
 
     def ages_s(self) -> dict[str, float]:
         """Return the cameras that are stale, each with the age of its last frame, s."""

@@ -82,7 +82,7 @@ class PanoramaOutputSettings(ViewNames, OverlapSettings, VideoSettings):
     )
     stale_after_s: float = setting(
         0.5,
-        'A camera that gave no frame for so long is stale.',
+        'A camera that gave no frame for so long, and for 2.5 periods, is stale.',
         minimum=0.05,
         maximum=60.0,
         live=True,

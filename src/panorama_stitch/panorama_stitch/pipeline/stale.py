@@ -1,11 +1,17 @@
 """Cameras that went silent: their last image stays, but nobody may take it for a live one."""
 
+from collections import deque
 from collections.abc import Sequence
+from statistics import median_low
 from time import monotonic
 
 import cv2
 import numpy as np
 
+_PERIODS = 2.5
+"""Of a camera, without a frame, before it can be stale."""
+_GAPS = 9
+"""Recent gaps between its frames of which the median is its period."""
 _BRIGHTNESS = 0.35
 _TEXT_SHARE = 0.06
 """Height of the letters as a share of the panorama's height."""
@@ -26,6 +32,8 @@ class StaleCameras:
     def __init__(self, cameras: Sequence[str]):
         self._images: dict[str, np.ndarray | None] = dict.fromkeys(cameras)
         self._arrived_s = dict.fromkeys(cameras, monotonic())
+        self._gaps_s = {camera: deque[float](maxlen=_GAPS) for camera in cameras}
+        self._periods_s = dict.fromkeys(cameras, 0.0)
         self._dimmed: dict[str, tuple[np.ndarray, np.ndarray]] = {}
 
     @property
@@ -35,18 +43,31 @@ class StaleCameras:
 
     def note(self, camera: str, image: np.ndarray) -> None:
         """Keep the newest image of a camera."""
+        now_s = monotonic()
+        if self._images[camera] is not None:
+            self._gaps_s[camera].append(now_s - self._arrived_s[camera])
+            self._periods_s[camera] = median_low(self._gaps_s[camera])
         self._images[camera] = image
-        self._arrived_s[camera] = monotonic()
+        self._arrived_s[camera] = now_s
 
     def forget(self, camera: str) -> None:
         """Drop the image of a camera that is another one now; its age stays."""
         self._images[camera] = None
 
     def ages_s(self, limit_s: float) -> dict[str, float]:
-        """Return the cameras that gave no image for longer than `limit_s`, with its age, s."""
+        """Return the cameras that are stale at a limit, each with the age of its image, s."""
         now_s = monotonic()
         ages_s = {camera: now_s - arrived for camera, arrived in self._arrived_s.items()}
-        return {camera: age for camera, age in ages_s.items() if age > limit_s}
+        return {
+            camera: age for camera, age in ages_s.items() if age > self._limit_s(camera, limit_s)
+        }
+
+    def longest_limit_s(self, limit_s: float) -> float:
+        """Return after how long without an image each camera would be stale, s."""
+        return max(self._limit_s(camera, limit_s) for camera in self._periods_s)
+
+    def _limit_s(self, camera: str, limit_s: float) -> float:
+        return max(limit_s, _PERIODS * self._periods_s[camera])
 
     def last(self, camera: str) -> np.ndarray | None:
         """Return the last image of a camera; None if there is none."""
