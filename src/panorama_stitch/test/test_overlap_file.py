@@ -83,7 +83,6 @@ def test_rounding_of_a_calibration_does_not_matter(path):
             {},
             "for the cameras 'left', 'middle', 'right'; these are left, right",
         ),
-        (CAMERAS, {'width': 700}, "camera 'left' at width 662; now it is 700"),
         (CAMERAS, {'kind': 'equirectangular'}, "at surface 'cylindrical'; now it is equirect"),
         (CAMERAS, {'focal_px': 230.0}, 'at focal_px 223.0528; now it is 230'),
     ],
@@ -95,12 +94,51 @@ def test_another_rig_is_refused(path, cameras, changes, sentence):
     assert str(path) in str(error.value)
 
 
+def test_a_rotation_holds_for_any_part_of_what_the_cameras_see(path):
+    cut = [surface.window(9, 5, surface.width - 30, 800) for surface in SURFACES]
+    cut[1] = SURFACES[1].window(20, -6, 700, 900)
+    first, second = read_overlaps(path, CAMERAS, cut)
+    assert first.attitude == read_overlaps(path, CAMERAS, SURFACES)[0].attitude
+    assert first.offset_x_px == pytest.approx(FIRST.offset_x_px - 9 + 20)
+    assert first.offset_y_px == pytest.approx(FIRST.offset_y_px - 5 - 6)
+    assert first.overlap_px == pytest.approx(632 - first.offset_x_px)
+    assert (second.found, second.offset_x_px) == (False, 700)
+
+
+@pytest.mark.parametrize(('version', 'attitude'), [(2, None), (1, FIRST.attitude)])
+def test_an_offset_holds_for_the_surfaces_that_it_was_measured_on(path, version, attitude):
+    flat = replace(FIRST, attitude=attitude)
+    write_overlaps(path, CAMERAS[:2], SURFACES[:2], [flat])
+    edit(path, lambda entries: entries.update(version=version))
+    if version == 1:
+        edit(path, lambda entries: entries['overlaps'][0].pop('yaw_deg'))
+    assert read_overlaps(path, CAMERAS[:2], SURFACES[:2])
+    wider = [replace(surface, width=700) for surface in SURFACES[:2]]
+    with pytest.raises(OverlapFileError, match="camera 'left' at width 662; now it is 700"):
+        read_overlaps(path, CAMERAS[:2], wider)
+
+
+def test_another_lens_behind_a_surface_of_the_same_focal_length_is_refused(path):
+    names = 'left', 'right'
+    write_overlaps(path, names, SURFACES[:2], [FIRST], (223.0528, 250.0))
+    assert read_overlaps(path, names, SURFACES[:2], (223.0528, 250.0))
+    fitted = [surface.with_focal(200.0) for surface in SURFACES[:2]]
+    (overlap,) = read_overlaps(path, names, fitted, (223.0528, 250.0))
+    yaw_px = (545.02 + SURFACES[1].center_x_px - SURFACES[0].center_x_px) * 200.0 / 223.0528
+    by_px = fitted[1].center_x_px - fitted[0].center_x_px
+    assert overlap.offset_x_px == pytest.approx(yaw_px - by_px)
+    with pytest.raises(OverlapFileError, match="'right' at lens_focal_px 250"):
+        read_overlaps(path, names, SURFACES[:2], (223.0528, 260.0))
+
+
 @pytest.mark.parametrize(
     ('change', 'sentence'),
     [
         (lambda e: e.update(version=3), 'version is 3; expected 1 or 2'),
         (lambda e: e.pop('version'), 'version is None; expected 1'),
         (lambda e: e.update(cameras='left'), "cameras is 'left'; expected a list"),
+        (lambda e: e['cameras'][0].update(width='wide'), 'expected a block with surface, width'),
+        (lambda e: e['cameras'][0].update(center_x_px=1e9), 'center_x_px is 1000000000.0; exp'),
         (lambda e: e.pop('overlaps'), 'overlaps is None; expected a list'),
         (lambda e: e['overlaps'].pop(), '1 overlaps for 3 cameras; expected one for each pair'),
         (lambda e: e['overlaps'].reverse(), "the overlap of 'left' and 'middle' is missing"),

@@ -115,10 +115,36 @@ def test_a_pipeline_goes_on_with_the_overlap_of_the_former_one(make_line, pictur
 def test_overlaps_of_other_lenses_are_not_inherited(make_line, pictures):
     first = make_line()
     first.feed(pictures, lambda: first.published, 'a panorama')
-    second = make_line(replace(SETTINGS, auto_calibrate=False, hfov_deg=150.0))
+    second = make_line(replace(SETTINGS, auto_calibrate=False))
+    other = replace(LENS, focal_x_px=LENS.focal_x_px + 1.0)
+    second.pipeline.place('left', other, SETTINGS.surface_of(other))
     second.pipeline.inherit(first.pipeline)
     second.feed(pictures, lambda: second.published, 'a panorama')
     assert not second.pipeline.overlaps[0].found
+
+
+@pytest.mark.parametrize('is_saved', [False, True])
+def test_an_overlap_holds_where_less_of_the_same_lens_is_lit(
+    make_line, pictures, tmp_path, is_saved
+):
+    path = tmp_path / 'overlap.yaml'
+    settings = replace(SETTINGS, overlap_file=str(path) if is_saved else '')
+    first = make_line(settings)
+    first.feed(pictures, lambda: first.published, 'a panorama')
+    second = make_line(replace(settings, auto_calibrate=False))
+    if is_saved:
+        first.pipeline.calibrate('', save=True).result(DEADLINE_S)
+    else:
+        second.pipeline.inherit(first.pipeline)
+    for camera, angle_rad in (('left', 1.4), ('right', 1.3)):
+        lens = LENS.with_max_angle(angle_rad)
+        second.pipeline.place(camera, lens, SETTINGS.surface_of(lens))
+    second.feed(pictures, lambda: second.published, 'a panorama')
+    assert overlap_in_use(second).found
+    left, right = second.pipeline.rig.surfaces
+    expected_px = overlap_in_use(first).offset_x_px + left.center_x_px - right.center_x_px
+    assert overlap_in_use(second).offset_x_px == pytest.approx(expected_px)
+    assert second.warnings == []
 
 
 def test_what_cannot_be_done_is_said(make_line, pictures, tmp_path):

@@ -12,6 +12,7 @@ from fisheye_capture.synthetic import synthetic_lens
 from fisheye_core.errors import GeometryError, OverlapError
 from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.image_circle import ImageCircle
+from panorama_stitch.overlap.overlap_result import Overlap, with_offset
 from panorama_stitch.pipeline.panorama_settings import PanoramaSettings
 from panorama_stitch.pipeline.rig_measurement import measure_overlaps
 from panorama_stitch.pipeline.rig_state import RigState
@@ -70,13 +71,71 @@ def test_an_offset_set_by_hand_wins_and_nan_gives_the_measured_one_back(pictures
     assert stitcher.effective_overlaps(SETTINGS) == stitcher.overlaps
 
 
-def test_another_surface_makes_the_overlap_void(pictures):
+TURNED = Overlap('particles', True, attitude=Attitude(*np.radians((140.0, 4.0, -3.0))))
+
+
+def on_now(stitcher, overlap):
+    """What an overlap says on the surfaces in use."""
+    (pair,) = stitcher.pairs
+    attitudes = stitcher.solution([overlap], SETTINGS).rig.attitudes(pair)
+    return with_offset(overlap, *stitcher.surfaces, attitudes)
+
+
+@pytest.mark.parametrize('kind', ['cylindrical', 'equirectangular'])
+@pytest.mark.parametrize('is_corrected', [False, True])
+def test_an_overlap_holds_for_any_part_of_what_its_cameras_see(kind, is_corrected):
+    settings = replace(SETTINGS, surface=kind)
+    stitcher = RigState(('left', 'right'))
+
+    def place(camera, lens, how=settings):
+        surface = how.surface_of(lens)
+        return stitcher.place(camera, surface if is_corrected else lens, surface)
+
+    for camera in stitcher.cameras:
+        place(camera, LENS)
+    stitcher.overlaps = [TURNED]
+    (before,) = stitcher.overlaps = [on_now(stitcher, TURNED)]
+    assert not place('left', LENS), 'nothing new'
+    assert stitcher.overlaps == [before]
+    narrow = LENS.with_max_angle(np.radians(75))
+    cropped = replace(settings, hfov_deg=120.0, vfov_deg=70.0)
+    for camera, lens, how in (('left', narrow, settings), ('right', LENS, cropped)):
+        assert place(camera, lens, how)
+        (after,) = stitcher.overlaps
+        expected = on_now(stitcher, before)
+        assert after.attitude == TURNED.attitude
+        assert after.offset_x_px == pytest.approx(expected.offset_x_px)
+        assert after.offset_y_px == pytest.approx(expected.offset_y_px)
+        assert after.overlap_px == pytest.approx(expected.overlap_px)
+        assert after.offset_x_px != pytest.approx(before.offset_x_px, abs=1.0)
+
+
+def test_another_lens_or_kind_of_surface_makes_the_overlap_void():
+    longer = replace(LENS, focal_x_px=LENS.focal_x_px + 1.0)
+    sphere = replace(SETTINGS, surface='equirectangular').surface_of(LENS)
+    for source, surface in ((longer, SETTINGS.surface_of(longer)), (LENS, sphere)):
+        stitcher = stitcher_of()
+        stitcher.overlaps = [TURNED]
+        assert stitcher.place('left', source, surface)
+        assert stitcher.overlaps is None
+
+
+def test_an_offset_alone_holds_for_its_surfaces_only():
+    narrow = LENS.with_max_angle(np.radians(75))
     stitcher = stitcher_of()
-    stitcher.overlaps = measure_overlaps(stitcher, [pictures], SETTINGS, 'particles')
-    assert not stitcher.place('left', LENS, SETTINGS.surface_of(LENS)), 'nothing new'
-    assert stitcher.overlaps
-    assert stitcher.place('left', LENS, replace(SETTINGS, hfov_deg=150.0).surface_of(LENS))
+    stitcher.overlaps = [replace(TURNED, attitude=None, offset_x_px=500.0)]
+    assert stitcher.place('left', narrow, SETTINGS.surface_of(narrow))
     assert stitcher.overlaps is None
+
+
+def test_where_one_pair_was_found_the_other_stays_side_by_side():
+    narrow = LENS.with_max_angle(np.radians(75))
+    stitcher = stitcher_of((LENS,) * 3, ('left', 'middle', 'right'))
+    apart = Overlap('particles', False, offset_x_px=float(stitcher.surfaces[1].width))
+    stitcher.overlaps = [TURNED, apart]
+    assert stitcher.place('middle', narrow, SETTINGS.surface_of(narrow))
+    assert [overlap.found for overlap in stitcher.overlaps] == [True, False]
+    assert stitcher.overlaps[1].offset_x_px == stitcher.surfaces[1].width
 
 
 def test_what_was_measured_on_other_surfaces_is_not_taken(pictures):

@@ -175,6 +175,36 @@ def with_offset(
     )
 
 
+def on_surfaces(
+    overlap: Overlap, then: tuple[Surface, Surface], now: tuple[Surface, Surface]
+) -> Overlap:
+    """Return an overlap with the offset that it means on other surfaces of the same cameras.
+
+    Parameters
+    ----------
+    overlap
+        One with an attitude, which stays as it is, or one that was not found.
+    then, now
+        What the corrected images of the left and the right camera were on, and are on; all of one
+        kind.
+    """
+    if then == now:
+        return overlap
+    left, right = now
+    if not overlap.found:
+        return replace(overlap, offset_x_px=float(left.width))
+    zoom = left.focal_px / then[0].focal_px
+    x_px = zoom * (overlap.offset_x_px - then[0].center_x_px + then[1].center_x_px)
+    y_px = zoom * (overlap.offset_y_px - then[0].center_y_px + then[1].center_y_px)
+    x_px += left.center_x_px - right.center_x_px
+    return replace(
+        overlap,
+        offset_x_px=x_px,
+        offset_y_px=y_px + left.center_y_px - right.center_y_px,
+        overlap_px=common_px(x_px, left, right),
+    )
+
+
 def _offset_px(
     left: Surface, right: Surface, attitudes: tuple[Attitude, Attitude]
 ) -> tuple[float, float]:

@@ -5,13 +5,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from fisheye_core.errors import FileContentError, GeometryError, OverlapFileError
-from fisheye_core.yaml_file import is_missing, read_mapping, shown
+from fisheye_core.yaml_file import is_missing, read_mapping
 from fisheye_geometry.rig import Rig
 from fisheye_geometry.rig_solution import solve_rig
-from fisheye_geometry.surface import Surface
-from panorama_stitch.overlap.overlap_file import LENGTH_KEYS, SIZE_KEYS, overlaps_in
-
-_KEYS = *SIZE_KEYS, *LENGTH_KEYS
+from panorama_stitch.overlap.overlap_file import overlaps_in, surfaces_in
 
 
 def saved_rig(path: str | Path, cameras: Sequence[str]) -> Rig | None:
@@ -41,7 +38,7 @@ def saved_rig(path: str | Path, cameras: Sequence[str]) -> Rig | None:
         return None
     try:
         entries = read_mapping(path)
-        surfaces = _surfaces(entries.get('cameras'))
+        surfaces = surfaces_in(entries)
         overlaps = overlaps_in(entries, cameras, surfaces)
         rotations = [None if o.attitude is None else o.attitude.matrix for o in overlaps]
         between = len(cameras) - 1
@@ -54,14 +51,4 @@ def saved_rig(path: str | Path, cameras: Sequence[str]) -> Rig | None:
         reason = getattr(error, 'reason', str(error))
         raise OverlapFileError(
             f'it is not the overlap file of {", ".join(cameras)}: {reason}', path
-        ) from error
-
-
-def _surfaces(entries: object) -> list[Surface]:
-    """Return what the images of the cameras were on."""
-    try:
-        return [Surface(entry['surface'], *(entry[key] for key in _KEYS)) for entry in entries]
-    except (KeyError, TypeError) as error:
-        raise OverlapFileError(
-            f'cameras is {shown(entries)}; expected a block with {", ".join(_KEYS)} for each'
         ) from error

@@ -10,7 +10,6 @@ import numpy as np
 
 from fisheye_core.background import Background
 from fisheye_core.errors import FisheyeError, OverlapError
-from fisheye_geometry.surface import Surface
 from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.overlap.overlap_file import read_overlaps, write_overlaps
 from panorama_stitch.overlap.overlap_result import Overlap
@@ -48,7 +47,7 @@ class CompositorBuilder:
         self._due_s = 0.0
         self._pause_s = _FIRST_PAUSE_S
         self._job: Future | None = None
-        self._inherited: tuple[list[Overlap], list[Surface]] | None = None
+        self._inherited: RigState | None = None
 
     def take(
         self,
@@ -107,7 +106,7 @@ class CompositorBuilder:
     def inherit(self, former: RigState) -> None:
         """Prefer overlaps that are known already to those of the overlap file."""
         if former.overlaps and all(overlap.found for overlap in former.overlaps):
-            self._inherited = former.overlaps, former.surfaces
+            self._inherited = former
 
     def tell(self, sentence: str) -> None:
         """Note what did not work, for `take_notices`."""
@@ -176,7 +175,9 @@ class CompositorBuilder:
             ]
         overlaps = kept(measured, rig.overlaps or [])
         if save and all(overlap.found for overlap in measured):
-            write_overlaps(settings.overlap_file, rig.cameras, surfaces, overlaps)
+            write_overlaps(
+                settings.overlap_file, rig.cameras, surfaces, overlaps, rig.lens_focals_px
+            )
         if not rig.set_overlaps(overlaps, surfaces):
             raise OverlapError('the cameras changed meanwhile; expected them to stay as they are')
         self._use(remembered[-1], settings)
@@ -196,10 +197,10 @@ class CompositorBuilder:
     def _read(self, path: str) -> None:
         rig = self._rig
         surfaces = rig.surfaces
-        if self._inherited and rig.set_overlaps(*self._inherited):
+        if self._inherited and rig.inherit(self._inherited):
             return
         try:
-            if overlaps := read_overlaps(path, rig.cameras, surfaces):
+            if overlaps := read_overlaps(path, rig.cameras, surfaces, rig.lens_focals_px):
                 rig.set_overlaps(overlaps, surfaces)
         except FisheyeError as error:
             self.tell(f'{error}; the overlap is measured instead')

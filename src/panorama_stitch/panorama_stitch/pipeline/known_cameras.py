@@ -53,7 +53,16 @@ class KnownCameras:
     @property
     def surfaces(self) -> list[Surface]:
         """What the corrected images show, all with the focal length of the first."""
-        return [surface for _, surface in sorted(_with_one_focal(self.places).items())]
+        return surfaces_of(self.places)
+
+    @property
+    def lens_focals_px(self) -> list[float]:
+        """Focal length of what gives each camera's images, on whatever they are drawn."""
+        sources = [place.source for _, place in sorted(self.places.items())]
+        return [
+            source.focal_px if isinstance(source, Surface) else source.focal_x_px
+            for source in sources
+        ]
 
     @property
     def camera_views(self) -> list[CameraView]:
@@ -121,6 +130,28 @@ class CameraPlace:
     source: Lens | Surface
     surface: Surface
     interpolation: str
+
+    def is_crop_of(self, other: 'CameraPlace') -> bool:
+        """Whether it shows the same camera as another, on a surface of the same kind.
+
+        Of a lens the image circle may differ; of images that were corrected elsewhere nothing is
+        known but their surface, whose focal length tells lenses apart.
+        """
+        if self.surface.kind != other.surface.kind:
+            return False
+        mine, theirs = self.source, other.source
+        if isinstance(mine, Surface) or isinstance(theirs, Surface):
+            return (
+                isinstance(mine, Surface)
+                and isinstance(theirs, Surface)
+                and (mine.kind, mine.focal_px) == (theirs.kind, theirs.focal_px)
+            )
+        return mine == theirs.with_max_angle(mine.visible_angle_rad)
+
+
+def surfaces_of(places: dict[int, CameraPlace]) -> list[Surface]:
+    """Return what the corrected images show, all with the focal length of the first."""
+    return [surface for _, surface in sorted(_with_one_focal(places).items())]
 
 
 def _with_one_focal(places: dict[int, CameraPlace]) -> dict[int, Surface]:

@@ -5,7 +5,6 @@ from math import isnan, nan
 
 import numpy as np
 
-from fisheye_geometry.lens import Lens
 from fisheye_geometry.rig import Pair, pairs_for
 from fisheye_geometry.surface import Surface
 from panorama_stitch.compose.build import Style, build_compositor
@@ -15,43 +14,39 @@ from panorama_stitch.compose.posing import views_at_overlaps, views_of_rig
 from panorama_stitch.compose.view import View
 from panorama_stitch.overlap.overlap_result import (
     Overlap,
+    on_surfaces,
     overlap_by_hand,
     side_by_side,
 )
-from panorama_stitch.pipeline.known_cameras import Images
+from panorama_stitch.pipeline.known_cameras import CameraPlace, Images, surfaces_of
 from panorama_stitch.pipeline.mounted_cameras import MountedCameras
 from panorama_stitch.pipeline.panorama_settings import PanoramaOutputSettings
 
 
 class RigState(MountedCameras):
-    """Mounted cameras, the overlaps between neighbours, and the compositor that follows.
+    """Mounted cameras, the overlaps between neighbours, and the compositor that follows."""
 
-    Attributes
-    ----------
-    overlaps
-        One for each of `pairs` as measured or read; None before.
-    """
+    _measured: tuple[list[Overlap] | None, dict[int, CameraPlace]] = None, {}
 
-    overlaps: list[Overlap] | None = None
+    @property
+    def overlaps(self) -> list[Overlap] | None:
+        """One for each of `pairs` as measured or read; None before.
+
+        Where only another part of what the same cameras see is shown, as when the image circle of
+        a lens turns out to be larger, rotations stay and their offsets follow; else they are
+        forgotten.
+        """
+        overlaps, places = self._measured
+        return overlaps and self._as_shown_now(overlaps, places)
+
+    @overlaps.setter
+    def overlaps(self, overlaps: list[Overlap] | None) -> None:
+        self._measured = overlaps, dict(self.places)
 
     @property
     def pairs(self) -> tuple[Pair, ...]:
         """Neighbours, the closing pair of a ring last; one for each of the overlaps."""
         return pairs_for(len(self.cameras), len(self.overlaps or ()))
-
-    def place(
-        self, camera: str, source: Lens | Surface, surface: Surface, interpolation: str = 'linear'
-    ) -> bool:
-        """Set what a camera's images show, as `KnownCameras`.
-
-        Overlaps that were measured on other surfaces are forgotten.
-        """
-        former = self.places.get(self.cameras.index(camera))
-        is_news = super().place(camera, source, surface, interpolation)
-        if former and former.surface != surface:
-            with self._lock:
-                self.overlaps = None
-        return is_news
 
     def set_overlaps(self, overlaps: list[Overlap], surfaces: list[Surface]) -> bool:
         """Use overlaps if the surfaces that they were measured on are still in use; whether so."""
@@ -59,6 +54,14 @@ class RigState(MountedCameras):
             is_current = surfaces == self.surfaces
             if is_current:
                 self.overlaps = overlaps
+        return is_current
+
+    def inherit(self, former: 'RigState') -> bool:
+        """Use the overlaps of another rig if they hold for what is shown here; whether so."""
+        overlaps, places = former._measured
+        is_current = bool(overlaps and self._as_shown_now(overlaps, places))
+        if is_current:
+            self._measured = overlaps, places
         return is_current
 
     def effective_overlaps(self, settings: PanoramaOutputSettings) -> list[Overlap]:
@@ -117,6 +120,29 @@ class RigState(MountedCameras):
             is_gain_compensated=settings.gain_compensation,
         )
         return build_compositor(views, images, style, wraps=wraps)
+
+    def _as_shown_now(
+        self, overlaps: list[Overlap], places: dict[int, CameraPlace]
+    ) -> list[Overlap] | None:
+        """Return overlaps with their offsets on what is in use; None where they do not hold."""
+        then, now = surfaces_of(places), self.surfaces
+        if then == now:
+            return overlaps
+        found = [overlap for overlap in overlaps if overlap.found]
+        if (
+            not found
+            or not all(overlap.attitude for overlap in found)
+            or places.keys() != self.places.keys()
+            or not all(place.is_crop_of(places[index]) for index, place in self.places.items())
+        ):
+            return None
+        pairs = pairs_for(len(self.cameras), len(overlaps))
+        return [
+            on_surfaces(
+                overlap, (then[pair.left], then[pair.right]), (now[pair.left], now[pair.right])
+            )
+            for overlap, pair in zip(overlaps, pairs, strict=True)
+        ]
 
     def _views(
         self, overlaps: Sequence[Overlap], settings: PanoramaOutputSettings, images: Images
