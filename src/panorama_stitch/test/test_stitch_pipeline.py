@@ -15,7 +15,12 @@ from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.remap import RemapTable
 from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.pipeline import pairing
-from panorama_stitch.pipeline.metrics import economy_sentence, metrics, unpaired_sentence
+from panorama_stitch.pipeline.metrics import (
+    economy_sentence,
+    lag_sentence,
+    metrics,
+    unpaired_sentence,
+)
 
 TABLES = 3
 """A compositor needs at most so many for each camera: drawing, seams, gain."""
@@ -173,6 +178,18 @@ def test_a_camera_that_comes_too_late_is_named(make_line, pictures, monkeypatch)
     stamps_apart(line, pictures, -2.0, lambda: time.monotonic() > end, 'time for a pair')
     sentence = unpaired_sentence(line.pipeline)
     assert 'right comes 2000 ms later than left, more than can wait in ' in sentence
+
+
+def test_a_camera_that_all_wait_for_is_named(make_line, pictures):
+    line = make_line()
+    line.feed(pictures, lambda: len(line.published) > 5, 'panoramas')
+    assert lag_sentence(line.pipeline) == ''
+    sentence = 'right comes 1000 ms later than left by its stamps, and the panorama with it'
+    stamps_apart(
+        line, pictures, -1.0, lambda: sentence in lag_sentence(line.pipeline), 'the sentence'
+    )
+    line.pipeline.apply(replace(SETTINGS, pair_by='arrival'))
+    assert lag_sentence(line.pipeline) == ''
 
 
 def test_a_lens_that_changes_with_each_frame_stops_no_panorama(make_line, pictures):

@@ -35,6 +35,7 @@ from panorama_stitch.nodes.views import Views
 from panorama_stitch.overlap.overlap_settings import METHODS
 from panorama_stitch.pipeline.metrics import (
     economy_sentence,
+    lag_sentence,
     metrics,
     unpaired_sentence,
 )
@@ -162,6 +163,8 @@ class PanoramaBase(Node):
             report.add(OK, sentence)
         if pipeline.frames.unpaired_s:
             report.add(ERROR, unpaired_sentence(pipeline))
+        elif sentence := lag_sentence(pipeline):
+            report.add(WARN, sentence)
         ages_s = pipeline.frames.ages_s()
         all_stale = len(ages_s) == len(self.settings.cameras)
         for camera, age_s in ages_s.items():

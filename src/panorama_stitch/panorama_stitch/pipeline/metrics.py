@@ -7,6 +7,7 @@ import numpy as np
 from panorama_stitch.pipeline.pairing import LONGEST_WAIT_NS, ROOM_BYTES
 from panorama_stitch.pipeline.stitch_pipeline import StitchPipeline
 
+_LONG_LAG_NS = 250_000_000
 _PERCENTILES = (50, 95, 99)
 _LONGEST_LATENCY_MS = 10_000.0
 """What is older was not taken by the clock of this machine."""
@@ -67,6 +68,19 @@ def economy_sentence(pipeline: StitchPipeline) -> str:
     return (
         f'no time for blend:={pipeline.settings.blend} at this rate: seams only fade until there '
         'is (fewer or smaller pictures, or blend:=feather)'
+    )
+
+
+def lag_sentence(pipeline: StitchPipeline) -> str:
+    """Tell that the panorama waits long for one camera; '' where it does not."""
+    pairing = pipeline.frames.pairing
+    if pipeline.settings.pair_by == 'arrival' or pairing.lag_ns < _LONG_LAG_NS:
+        return ''
+    late, early = pairing.late_and_early
+    return (
+        f'{late} comes {pairing.lag_ns / 1e6:.0f} ms later than {early} by its stamps, and the '
+        'panorama with it; if that is not its delay but its clock, pair_by:=arrival joins what '
+        'arrives together'
     )
 
 

@@ -14,6 +14,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import inf
+from statistics import median
 from typing import Any, NamedTuple
 
 from panorama_stitch.pipeline.frame_clock import FrameClock
@@ -105,7 +106,7 @@ class FramePairing:
         self.max_skew_ns = max_skew_ns
         self.skews_ns: deque[int] = deque(maxlen=_SKEWS)
         self.is_full = False
-        self._lags_ns: deque[int] = deque(maxlen=_LAGS)
+        self._lags_ns: deque[tuple[str, int]] = deque(maxlen=_LAGS)
 
     @property
     def unpaired(self) -> dict[str, int]:
@@ -123,6 +124,13 @@ class FramePairing:
         """The cameras with the oldest and with the newest stamp, once all have one."""
         by_stamp = sorted(self._tracks, key=lambda name: self._tracks[name].clock.last_ns or 0)
         return by_stamp[0], by_stamp[-1]
+
+    @property
+    def lag_ns(self) -> float:
+        """How much later than another's the frames of the latest camera usually come."""
+        recent = list(self._lags_ns)
+        lags_ns = ([lag for name, lag in recent if name == camera] for camera in self._tracks)
+        return max((median(each) for each in lags_ns if each), default=0.0)
 
     def clear(self) -> None:
         """Forget what waits."""
@@ -172,11 +180,11 @@ class FramePairing:
             Whose frame came last, and when it was taken.
         """
         lag_ns = max(self._newest_ns) - stamp_ns
-        if lag_ns <= LONGEST_WAIT_NS:
-            self._lags_ns.append(lag_ns)
-        wait_ns = max(self._lags_ns, default=0) + self.max_skew_ns
-        oldest_ns = stamp_ns - min(wait_ns, LONGEST_WAIT_NS)
         track, tracks = self._tracks[camera], self._tracks.values()
+        if lag_ns <= LONGEST_WAIT_NS:
+            self._lags_ns.append((camera, lag_ns))
+        longest_ns = max((lag for _, lag in self._lags_ns), default=0)
+        oldest_ns = stamp_ns - min(longest_ns + self.max_skew_ns, LONGEST_WAIT_NS)
         while len(track.waiting) > _ALWAYS and track.head.stamped.stamp_ns < oldest_ns:
             track.drop()
         while long := [track for track in tracks if len(track.waiting) > _ALWAYS]:
