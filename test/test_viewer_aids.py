@@ -40,14 +40,10 @@ def page_with(browser, server, *aids, **size):
     """Open the page and switch aids on, and none besides."""
     page = Page(browser, server.url, **size)
     page.until(lambda: page.text('condition') == 'Live', 'a live picture')
-    for aid in {*aids} ^ set(on(page)):
+    for aid in {*aids} ^ set(page.aids):
         page.press(KEYS[aid])
-    assert set(on(page)) == {*aids}
+    assert set(page.aids) == {*aids}
     return page
-
-
-def on(page):
-    return page.driver.execute_script('return document.body.dataset.aids').split()
 
 
 def close_to(shot, color, near=50):
@@ -247,21 +243,21 @@ def test_a_seam_beyond_the_edge_of_a_ring_is_marked_where_it_comes_in(browser, s
 def test_keys_switch_the_aids_and_the_page_remembers(browser, serve):
     page = page_with(browser, serve(SURFACES[0], grey(SURFACES[0])), 'heading')
     for aid in KEYS:
-        was_on = aid in on(page)
+        was_on = aid in page.aids
         page.press(KEYS[aid])
-        assert (aid in on(page)) is not was_on
-    after = on(page)
+        assert (aid in page.aids) is not was_on
+    after = page.aids
     assert set(after) == {*KEYS} - {'heading'}
     page.driver.refresh()
-    assert on(page) == after
+    assert page.aids == after
     for aid in after:
         page.press(KEYS[aid])
     page.driver.refresh()
-    assert on(page) == []
+    assert page.aids == []
     page.driver.execute_script("localStorage.setItem('aids', 'no such aid')")
     page.driver.refresh()
     page.press('r')
-    assert 'rear' in on(page), 'whatever is remembered'
+    assert 'rear' in page.aids, 'whatever is remembered'
 
 
 def test_an_aid_that_fails_is_switched_off_and_the_picture_goes_on(browser, serve):
@@ -270,7 +266,7 @@ def test_an_aid_that_fails_is_switched_off_and_the_picture_goes_on(browser, serv
     page.driver.execute_script(script)
     page.press('r')
     page.until(lambda: 'Rear view is switched off' in page.text('answer'), 'words')
-    assert on(page) == ['edges']
+    assert page.aids == ['edges']
     page.press('v')
     patch(page, 'look', MAGENTA)
     page.until(lambda: page.text('condition') == 'Live', 'a live picture')
@@ -285,7 +281,7 @@ def test_a_finger_reaches_every_aid(browser, serve):
     for button in buttons:
         button.click()
         assert button.get_attribute('aria-pressed') == 'true'
-    assert set(on(page)) == {*KEYS}
+    assert set(page.aids) == {*KEYS}
     width = browser.execute_script('return document.documentElement.scrollWidth')
     assert width == 390, 'nothing sticks out'
 

@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -15,6 +16,7 @@ from viewer_page import (
     CLOSED,
     GREEN,
     MAGENTA,
+    REAR,
     SEAM,
     SPOT_DEG,
     SURFACES,
@@ -23,9 +25,12 @@ from viewer_page import (
     page_of,
     painted,
     patch,
+    where,
 )
 
 from fisheye_bridge.projection import surface_of
+from fisheye_geometry.attitude import Attitude, quaternion
+from fisheye_geometry.surface import Surface
 from fisheye_geometry.surface_kind import KINDS
 from fisheye_testing.rig import camera_parameters
 from panorama_viewer.projection import described
@@ -150,9 +155,9 @@ def test_one_turns_without_end_on_a_closed_panorama_only(browser, serve):
     turns_deg = [page.turn() for _ in range(45)]
     assert sum(turns_deg) > 400
     assert np.ptp(turns_deg) < 0.1
-    # The same picture, not closed, has ends.
-    server.tell(projection=described(CLOSED[0]))
-    for key, end_deg, what in ((Keys.ARROW_RIGHT, 180, 'right'), (Keys.ARROW_LEFT, -180, 'left')):
+    # One that does not lead quite around has ends.
+    server.tell(projection=described(replace(CLOSED[0], focal_px=754 / math.radians(175))))
+    for key, end_deg, what in ((Keys.ARROW_RIGHT, 175, 'right'), (Keys.ARROW_LEFT, -175, 'left')):
 
         def is_at_end(key=key, end_deg=end_deg):
             page.press(key * 5)  # the first may come before the page knows
@@ -178,6 +183,80 @@ def test_the_map_of_a_closed_panorama_leads_across_its_edge(browser, serve):
     for x in (1, width - 1):
         shown_deg = page.point('map', x, height / 2)
         assert aside_deg(shown_deg, BEHIND_DEG) == pytest.approx(0, abs=2 * CLOSE_DEG)
+
+
+@pytest.mark.parametrize('surface', REAR, ids=lambda surface: surface.kind)
+def test_all_of_what_cameras_see_behind_the_robot_is_reached(browser, serve, surface):
+    server = serve(surface, painted(surface, -150.0, 12.0))
+    page = Page(browser, server.url)
+    spot = patch(page, 'whole', MAGENTA).mean(axis=0)
+    assert page.point('whole', *spot) == pytest.approx(-150, abs=CLOSE_DEG)
+    page.press('d')
+    edges = ['45°', '\N{MINUS SIGN}45°']
+    page.until(lambda: [page.text('left-edge'), page.text('right-edge')] == edges, f'{edges}')
+    ticks = (page.shot('scale').max(axis=2) > 100).any(axis=0)
+    assert all(part.any() for part in np.array_split(ticks, 9)), 'the scale is as long'
+    page.press('v')
+    page.until(lambda: abs(page.bearing_deg) == pytest.approx(180, abs=0.1), 'the middle')
+    patch(page, 'look', MAGENTA)
+    page.press('v')
+    page.click('whole', *patch(page, 'whole', MAGENTA).mean(axis=0))
+    page.until(lambda: page.find('look').is_displayed(), 'the view')
+    spot = patch(page, 'look', MAGENTA).mean(axis=0)
+    assert page.point('look', *spot) == pytest.approx(-150, abs=CLOSE_DEG)
+    height, width = page.shot('look').shape[:2]
+    assert spot == pytest.approx([width / 2, height / 2], abs=8)
+    page.press(Keys.ARROW_RIGHT * 20)
+    width, height = (page.find('map').size[name] for name in ('width', 'height'))
+    page.click('map', width / 4, height / 2)
+    page.leave()
+    page.until(lambda: page.bearing_deg == pytest.approx(112.5, abs=2 * CLOSE_DEG), 'a turn')
+    lines = np.flatnonzero((page.shot('map')[height // 2] > 140).all(axis=1))
+    assert np.mean([lines.min(), lines.max()]) == pytest.approx(width / 4, abs=4)
+    page.press(Keys.ARROW_RIGHT * 30)
+    page.until(lambda: page.bearing_deg == pytest.approx(-45, abs=0.1), 'the right end')
+    server.tell(projection=described(surface.window(300, 0, 600, surface.height)))
+    page.until(lambda: abs(page.bearing_deg) == pytest.approx(180, abs=0.1), 'the middle again')
+
+
+def test_each_of_many_frames_side_by_side_is_reached(browser, serve):
+    surface = Surface('cylindrical', 1800, 560, 200.0, 899.5, 260.0)
+    image = np.full((560, 1800, 3), 90, np.uint8)
+    # A turn apart.
+    image[230:290, 50:110], image[230:290, 1307:1367] = MAGENTA, GREEN
+    server = serve(surface, image, orientation=quaternion(Attitude(0.0, 0.2, 0.0)))
+    page = Page(browser, server.url)
+    columns = {'seam_begin_px': 900, 'seam_end_px': 900, 'left_end_px': 900, 'right_begin_px': 900}
+    overlap = {'left': 'left', 'right': 'right', 'found': False, 'words': '', **columns}
+    server.tell(overlaps=[overlap])
+    for color in (MAGENTA, GREEN):
+        page.click('whole', *patch(page, 'whole', color).mean(axis=0))
+        page.until(lambda: page.find('look').is_displayed(), 'the view')
+        place = patch(page, 'look', color).mean(axis=0)
+        height, width = page.shot('look').shape[:2]
+        assert place == pytest.approx([width / 2, height / 2], abs=8)
+        page.press('v')
+    page.until(lambda: page.text('overlap') == 'none', 'the overlap')
+    page.press('m')
+    page.until(lambda: 'setup' in page.aids, 'the aid')
+    middle = page.shot('whole')[:, width // 2 - 20 : width // 2 + 20]
+    assert not len(where(middle, SEAM)), 'a ray would not tell of which frame it is'
+
+
+@pytest.mark.parametrize('surface', [SURFACES[0], *REAR], ids=['ahead', *(s.kind for s in REAR)])
+def test_a_panorama_of_a_robot_that_nods_is_shown_level(browser, serve, surface):
+    nod = Attitude(*np.radians((0.0, 6.0, -4.0)))
+    y, x = np.ogrid[: surface.height, : surface.width]
+    is_up = (surface.rays(x, y) @ nod.matrix.T)[..., 1] < 0
+    image = np.repeat(np.where(is_up, 220, 60).astype(np.uint8)[..., None], 3, axis=2)
+    page = Page(browser, serve(surface, image, orientation=quaternion(nod)).url)
+    page.until(lambda: page.text('condition') == 'Live', 'a live picture')
+    shot = page.shot('whole').max(axis=2)
+    scale = shot.shape[1] / surface.width
+    rows = slice(round((surface.center_y_px - 100) * scale), None)
+    horizon_px = rows.start + (shot[rows] > 140).sum(axis=0)
+    inner = slice(round(0.1 * len(horizon_px)), round(0.9 * len(horizon_px)))
+    assert abs(horizon_px[inner] - (surface.center_y_px + 0.5) * scale).max() < 2
 
 
 def test_a_phone_starts_by_looking_around(browser, serve):

@@ -23,10 +23,16 @@ SURFACES = [
     Surface('equirectangular', 1300, 480, 240.0, 640.0, 240.0),
     Surface('rectilinear', 1200, 700, 420.0, 600.0, 330.0),
 ]
+FOCAL_PX = 1200 / math.radians(270)
 CLOSED = [
     Surface('cylindrical', 1508, 560, 1508 / math.tau, 753.5, 260.0),
     Surface('equirectangular', 1507, 480, 1507 / math.tau, 753.0, 240.0),
 ]
+REAR = [
+    Surface(kind, 1200, 560, FOCAL_PX, 599.5 - math.pi * FOCAL_PX, 260.0)
+    for kind in ('cylindrical', 'equirectangular')
+]
+"""From 45 to 315 degrees."""
 MAGENTA, GREEN = (255, 0, 255), (0, 255, 0)
 SEAM = (216, 79, 255)
 """As the page marks it when one sets the rig up."""
@@ -65,6 +71,20 @@ class Page:
         return float(self.find('bearing').get_attribute('data-bearing-deg'))
 
     @property
+    def aids(self):
+        """Names of the aids that are on."""
+        return self.driver.execute_script('return document.body.dataset.aids').split()
+
+    def click(self, name, x, y):
+        """Press a place of an element."""
+        self.point(name, x, y)
+        ActionChains(self.driver, 0).click().perform()
+
+    def leave(self):
+        """Move the pointer off the picture."""
+        ActionChains(self.driver, 0).move_to_element(self.find('condition')).perform()
+
+    @property
     def bearing_deg(self):
         """Bearing of the middle of the view, or of what is under the pointer."""
         return float(self.find('bearing').get_attribute('data-bearing-deg') or 'nan')
@@ -90,7 +110,7 @@ def serve():
     """Return a function that shows one picture over and over, until `stop` is called."""
     ended, faults = [], []
 
-    def start(surface, image, wraps=False, tls=None, **settings):
+    def start(surface, image, wraps=False, tls=None, orientation=None, **settings):
         measured = Future()
         measured.set_result('measured anew')
         server = ViewerServer(
@@ -108,7 +128,7 @@ def serve():
 
         def feed():
             while not silent.wait(0.2):
-                server.show(jpeg)
+                server.show(jpeg, orientation)
 
         thread = threading.Thread(target=feed)
         thread.start()

@@ -1,5 +1,7 @@
 // The bearings of the picture's left and right edge, under it.
 
+import { inDegrees } from '/scale.js';
+
 const outputs = ['left', 'right'].map((side) => {
   const output = document.createElement('output');
   output.className = 'edge';
@@ -12,7 +14,6 @@ export function edges({ screen }) {
   const { clientWidth: width, clientHeight: height } = screen.shown;
   for (const [i, x] of [0, width].entries()) {
     const [bearing] = screen.angles(screen.shown, x, height / 2);
-    const degrees = Math.round((bearing / Math.PI) * 180);
-    outputs[i].value = `${degrees < 0 ? '−' : ''}${Math.abs(degrees)}°`;
+    outputs[i].value = inDegrees(bearing);
   }
 }

@@ -61,31 +61,50 @@ export class Projection {
       (y - this.center_y_px) / this.focal_px);
   }
 
-  /** Pixel [x, y] of a ray; null where the surface cannot show it. */
-  pixel(ray) {
+  /**
+   * Pixel [x, y] of a ray; null where the surface cannot show it. Of columns a turn apart, it is
+   * in the one whose bearing is next to `near`.
+   */
+  pixel(ray, near = this.middle) {
     const point = this.kind.point(ray);
-    return point && [
-      this.center_x_px + this.focal_px * point[0],
-      this.center_y_px + this.focal_px * point[1],
-    ];
+    if (!point) return null;
+    const a = this.kind.columnsAreBearings ? nextTo(near, point[0]) : point[0];
+    return [this.center_x_px + this.focal_px * a, this.center_y_px + this.focal_px * point[1]];
   }
 
-  /** The pixel's [bearing, angle above the horizon]. */
+  /** The pixel's [bearing, angle above the horizon]; bearings go on beyond half a turn. */
   angles(x, y) {
-    return anglesOf(this.ray(x, y));
+    const [bearing, up] = anglesOf(this.ray(x, y));
+    return [this.kind.columnsAreBearings ? (x - this.center_x_px) / this.focal_px : bearing, up];
   }
 
-  /** Bearings of the outer edges, infinite where there are none; angles of the other two. */
+  /** Bearing of the middle column. */
+  get middle() {
+    return this.angles((this.width - 1) / 2, this.center_y_px)[0];
+  }
+
+  /** Whether some bearings have two columns, as frames side by side may have. */
+  get repeats() {
+    return this.kind.columnsAreBearings && this.width - 1 > 2 * Math.PI * this.focal_px;
+  }
+
+  /** Bearings of the left and the right edge. */
+  get sides() {
+    return [-0.5, this.width - 0.5].map((x) => this.angles(x, this.center_y_px)[0]);
+  }
+
+  /** The same, infinite where one can turn on; angles above the horizon of the other edges. */
   get limits() {
     const [, top] = this.angles(this.center_x_px, -0.5);
     const [, bottom] = this.angles(this.center_x_px, this.height - 0.5);
-    if (this.wraps) return { left: -Infinity, right: Infinity, top, bottom };
-    const [left, right] = [-0.5, this.width - 0.5].map((edge_px) => {
-      if (!this.kind.columnsAreBearings) return this.angles(edge_px, this.center_y_px)[0];
-      return clamp((edge_px - this.center_x_px) / this.focal_px, -Math.PI, Math.PI);
-    });
+    const [left, right] = this.wraps ? [-Infinity, Infinity] : this.sides;
     return { left, right, top, bottom };
   }
+}
+
+/** The same direction as a bearing, at most half a turn from `near`. */
+export function nextTo(near, bearing) {
+  return bearing - 2 * Math.PI * Math.round((bearing - near) / (2 * Math.PI));
 }
 
 /** [bearing, angle above the horizon] of a ray. */
@@ -104,9 +123,27 @@ export class View {
     this.reset();
   }
 
-  /** Look straight ahead. */
-  reset() {
+  /** Look straight ahead; where the panorama does not hold that, at its middle. */
+  reset(projection = null) {
     Object.assign(this, START);
+    if (!projection) return;
+    const ahead = nextTo(projection.middle, this.yaw);
+    const { left, right } = projection.limits;
+    this.turnTo(left <= ahead && ahead <= right ? ahead : projection.middle, 0, projection);
+  }
+
+  /** Start anew where one would look outside a panorama that has come or changed. */
+  keepTo(projection) {
+    const { left, right, top, bottom } = projection.limits;
+    const isWithin = (yaw) => left <= yaw && yaw <= right;
+    if (!isWithin(this.yaw)) this.yaw = nextTo(projection.middle, this.yaw);
+    const isSeen = isWithin(this.yaw) && bottom <= this.pitch && this.pitch <= top;
+    if (!isSeen) this.reset(projection);
+  }
+
+  /** Next to which bearing the columns of a panorama are that this view shows. */
+  near({ repeats, middle }) {
+    return repeats ? this.yaw : middle;
   }
 
   /** Focal length for a picture of this size; `fov` spans its longer side. */
@@ -134,8 +171,7 @@ export class View {
   /** Look at a bearing and an angle above the horizon, as far as the panorama goes. */
   turnTo(yaw, pitch, projection) {
     const { left, right, top, bottom } = projection.limits;
-    const round = Number.isFinite(left) ? 0 : 2 * Math.PI * Math.round(yaw / (2 * Math.PI));
-    this.yaw = clamp(yaw - round, left, right);
+    this.yaw = clamp(Number.isFinite(left) ? yaw : nextTo(0, yaw), left, right);
     this.pitch = clamp(pitch, bottom, top);
   }
 

@@ -5,7 +5,8 @@ import { Look } from '/look.js';
 export class Level {
   /** Return the picture as it would be on the same surface, were it level; uses the bitmap up. */
   levelled(bitmap, projection, orientation) {
-    if (!orientation || !projection) return bitmap;
+    // Frames side by side are at no true bearings by which they could be turned.
+    if (!orientation || !projection || projection.repeats) return bitmap;
     try {
       this.look ??= new Look(new OffscreenCanvas(1, 1));
     } catch {

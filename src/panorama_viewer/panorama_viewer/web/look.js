@@ -11,6 +11,8 @@ const VERTEX = `
     gl_Position = vec4(corner.x, -corner.y, 0.0, 1.0);
   }`;
 
+const TURN = (2 * Math.PI).toFixed(9);
+
 const CASES = Object.values(SURFACES).map(
   ({ shader }, kind) => `if (kind == ${kind}) return ${shader};`,
 );
@@ -25,9 +27,9 @@ const FRAGMENT = `
   uniform sampler2D panorama;
   uniform mat3 turn;
   uniform int kind;
-  uniform bool wraps, isFlat;
+  uniform bool wraps, isFlat, columnsAreBearings;
   uniform vec2 center, size, share;
-  uniform float focal;
+  uniform float focal, near;
   vec2 place(vec3 ray) {
     ${CASES.join('\n    ')}
     return vec2(1e9);
@@ -38,7 +40,9 @@ const FRAGMENT = `
   }
   void main() {
     vec3 ray = isFlat ? vec3(point, 1.0) : unfold(point);
-    vec2 where = (center + focal * place(turn * ray) + 0.5) / size;
+    vec2 met = place(turn * ray);
+    if (columnsAreBearings) met.x -= ${TURN} * floor((met.x - near) / ${TURN} + 0.5);
+    vec2 where = (center + focal * met + 0.5) / size;
     if (wraps) where.x = fract(where.x);
     bool inside = all(greaterThanEqual(where, vec2(0.0))) && all(lessThanEqual(where, vec2(1.0)));
     gl_FragColor = inside ? texture2D(panorama, where * share) : vec4(0.063, 0.082, 0.106, 1.0);
@@ -100,7 +104,7 @@ export class Look {
     gl.uniformMatrix3fv(this.at('turn'), false, [
       ...ray.map((i) => right[i] - ahead[i]), ...ray.map((i) => down[i] - ahead[i]), ...ahead,
     ]);
-    this.fill(bitmap, projection);
+    this.fill(bitmap, projection, view.near(projection));
   }
 
   /** Draw a panorama on its own surface, by rows of a rotation of its rays to level ones. */
@@ -111,10 +115,10 @@ export class Look {
     gl.uniform2f(this.at('reach'), width / 2 / focal, height / 2 / focal);
     gl.uniform2f(this.at('middle'), ((width - 1) / 2 - x) / focal, ((height - 1) / 2 - y) / focal);
     gl.uniformMatrix3fv(this.at('turn'), false, rows); // as columns: the way back
-    this.fill(bitmap, projection);
+    this.fill(bitmap, projection, projection.middle);
   }
 
-  fill(bitmap, projection) {
+  fill(bitmap, projection, near) {
     const { gl, canvas } = this;
     if (bitmap !== this.shown) {
       gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGB, gl.RGB, gl.UNSIGNED_BYTE, bitmap);
@@ -123,6 +127,8 @@ export class Look {
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.uniform1i(this.at('kind'), Object.keys(SURFACES).indexOf(projection.surface));
     gl.uniform1i(this.at('wraps'), projection.wraps);
+    gl.uniform1i(this.at('columnsAreBearings'), projection.kind.columnsAreBearings);
+    gl.uniform1f(this.at('near'), near);
     gl.uniform2f(this.at('center'), projection.center_x_px, projection.center_y_px);
     gl.uniform2f(this.at('size'), projection.width, projection.height);
     gl.uniform2f(this.at('share'), ...projection.share(bitmap));

@@ -78,7 +78,7 @@ class Viewer {
   }
 
   reset() {
-    this.screen.view.reset();
+    this.screen.view.reset(this.screen.projection);
     this.screen.redraw();
   }
 

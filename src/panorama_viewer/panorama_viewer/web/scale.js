@@ -1,5 +1,7 @@
 // The bearing scale under the picture, and the bearing under the pointer.
 
+import { nextTo } from '/geometry.js';
+
 const STEPS = [1, 2, 5, 10, 15, 30, 45, 90];
 const ROOM = 3.8; // heights of the text that a label needs in width
 const DEGREE = Math.PI / 180;
@@ -12,13 +14,13 @@ export class Scale {
     this.pen = this.canvas.getContext('2d');
   }
 
-  /** Draw ticks; `place` gives the x of a bearing in CSS px, or null where it is not shown. */
-  draw(place, limits) {
+  /**
+   * Draw ticks from one bearing to another; `place` gives the x of a bearing in CSS px, or null
+   * where it is not shown.
+   */
+  draw(place, from, to) {
     const { pen, canvas } = this;
     const width = canvas.clientWidth;
-    const [low, high] = [limits.left, limits.right].map((limit) => limit / DEGREE);
-    const first = Math.ceil(Math.max(low, -179));
-    const last = Math.floor(Math.min(high, 180));
     pen.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
     pen.clearRect(0, 0, width, canvas.clientHeight);
     const style = getComputedStyle(canvas);
@@ -27,11 +29,10 @@ export class Scale {
     pen.font = `500 ${this.size}px ${style.fontFamily}`;
     pen.textAlign = 'center';
     const ticks = [];
-    for (let degrees = first; degrees <= last; degrees++) {
+    for (let degrees = Math.ceil(from / DEGREE); degrees <= to / DEGREE; degrees++) {
       const x = place(degrees * DEGREE);
       if (x !== null && x >= 0 && x <= width) ticks.push([degrees, x]);
     }
-    ticks.sort(([, x], [, other]) => x - other); // all around, 180° may be in the middle
     const step = STEPS.find((s) => gap(ticks, s) >= ROOM * this.size) ?? STEPS.at(-1);
     const fine = STEPS.find((s) => step % s === 0 && gap(ticks, s) >= 5) ?? step;
     pen.beginPath();
@@ -40,14 +41,14 @@ export class Scale {
       pen.moveTo(x, 0);
       pen.lineTo(x, degrees % step ? 4 : 8);
       if (degrees % step || x < 1.2 * this.size || x > width - 1.2 * this.size) continue;
-      pen.fillText(`${degrees < 0 ? '−' : ''}${Math.abs(degrees)}°`, x, this.size + 10);
+      pen.fillText(inDegrees(degrees * DEGREE), x, this.size + 10);
     }
     pen.stroke();
   }
 
   /** Show what lies at x, CSS px from the left edge; null if that is beside the scale. */
   point(x, [bearing, elevation]) {
-    const degrees = bearing / DEGREE;
+    const degrees = nextTo(0, bearing) / DEGREE;
     const height = aside(elevation / DEGREE, 'down', 'up');
     this.label.value = `${aside(degrees, 'left', 'right')} · ${height}`;
     this.label.dataset.bearingDeg = degrees.toFixed(2);
@@ -57,6 +58,12 @@ export class Scale {
     this.label.style.left = `${Math.min(Math.max(at, half), Math.max(width - half, half))}px`;
     this.element.style.setProperty('--at', x === null ? '-9px' : `${x}px`);
   }
+}
+
+/** A bearing in words: whole degrees from −179° to 180°. */
+export function inDegrees(bearing) {
+  const degrees = Math.round(nextTo(0, bearing) / DEGREE);
+  return `${degrees < 0 && degrees > -180 ? '−' : ''}${Math.abs(degrees)}°`;
 }
 
 /** Smallest distance in px between neighbouring multiples of `step`. */

@@ -1,7 +1,7 @@
 // What is on the screen: the whole panorama, or a view into it with a map; the scale under both.
 
 import { Aids } from '/aids.js';
-import { Projection, View, anglesOf } from '/geometry.js';
+import { Projection, View, anglesOf, nextTo } from '/geometry.js';
 import { Level } from '/level.js';
 import { Look } from '/look.js';
 import { Scale } from '/scale.js';
@@ -49,6 +49,7 @@ export class Screen {
     if (JSON.stringify(projection) === JSON.stringify(this.projection)) return;
     this.projection = null;
     this.projection = new Projection(projection);
+    this.view.keepTo(this.projection);
     this.arrange();
   }
 
@@ -106,7 +107,7 @@ export class Screen {
     } else {
       this.whole.draw(bitmap, projection);
     }
-    this.scale.draw((bearing) => this.column(bearing), projection.limits);
+    this.scale.draw((bearing) => this.column(bearing), ...this.onScale);
     this.aids.draw();
     this.point();
   }
@@ -132,15 +133,22 @@ export class Screen {
     return pixel && pixel.map((p) => ((p + 0.5) / this.projection.width) * width);
   }
 
-  /** Where a bearing lies on the scale, CSS px; null for nowhere. */
+  /** The first and the last bearing that may be on the scale. */
+  get onScale() {
+    if (this.mode !== 'look') return this.projection.sides;
+    const [{ left, right }, { yaw }] = [this.projection.limits, this.view];
+    return [Math.max(left, yaw - BESIDE), Math.min(right, yaw + BESIDE)];
+  }
+
+  /** Where a bearing, as the columns have it, lies on the scale, CSS px; null for nowhere. */
   column(bearing) {
     const { view, projection } = this;
     if (this.mode === 'look') {
-      const aside = Math.atan2(Math.sin(bearing - view.yaw), Math.cos(bearing - view.yaw));
+      const aside = nextTo(0, bearing - view.yaw);
       if (Math.abs(aside) > BESIDE) return null;
       return $('look').clientWidth / 2 + this.focal * Math.tan(aside) * Math.cos(view.pitch);
     }
-    const pixel = projection.pixel([Math.sin(bearing), 0, Math.cos(bearing)]);
+    const pixel = projection.pixel([Math.sin(bearing), 0, Math.cos(bearing)], bearing);
     return pixel && ((pixel[0] + 0.5) / projection.width) * $('whole').clientWidth;
   }
 

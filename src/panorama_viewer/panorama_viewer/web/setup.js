@@ -7,6 +7,8 @@ const ROOM = 22; // CSS px between the bars of neighbours, and above the first
 
 export function setup({ screen, sketch, state }) {
   const { projection } = screen;
+  // A ray would not tell which of two columns is meant.
+  if (projection.repeats) return;
   const overlaps = (state.overlaps ?? []).filter((overlap) => overlap.seam_begin_px != null);
   for (const { seam_begin_px: begin, seam_end_px: end } of overlaps) {
     sketch.line(column(projection, (begin + end) / 2), SEAM);

@@ -23,9 +23,10 @@ export class Whole {
     const { width } = canvas;
     const scale = width / projection.width;
     const path = new Path2D();
+    const near = view.near(projection);
     let last = null;
     for (const [u, v] of border(view, ratio)) {
-      const pixel = projection.pixel(view.ray(u, v));
+      const pixel = projection.pixel(view.ray(u, v), near);
       let [x, y] = pixel ? pixel.map((p) => (p + 0.5) * scale) : [];
       if (projection.wraps && last !== null) x -= width * Math.round((x - last) / width);
       const joined = pixel && last !== null && Math.abs(x - last) < width / 2;
