@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 import viewer_page
 from selenium.webdriver import Keys
-from viewer_page import CLOSED, MAGENTA, SEAM, SURFACES, Page, painted, patch
+from viewer_page import CLOSED, MAGENTA, REAR, SEAM, SURFACES, Page, painted, patch
 
+from fisheye_geometry.attitude import Attitude, quaternion
 from fisheye_geometry.surface import Surface
 
 serve = viewer_page.serve  # its fixture
@@ -221,6 +222,21 @@ def test_the_seam_and_the_fields_are_marked_at_their_columns(browser, serve, sur
     seam = close_to(page.shot('look'), SEAM)
     ((true_px, _),) = in_view(page, ray)
     assert np.median(seam[seam[:, 1] == row, 0] + 0.5) == pytest.approx(true_px, abs=1.5)
+
+
+@pytest.mark.parametrize('surface', [SURFACES[0], REAR[0]], ids=['ahead', 'behind'])
+def test_the_seam_is_marked_where_it_is_in_a_picture_that_was_levelled(browser, serve, surface):
+    nod = Attitude(*np.radians((0.0, 6.0, -4.0)))
+    server = serve(surface, grey(surface), orientation=quaternion(nod))
+    server.tell(overlaps=[joined('left', 'right', (300, 300), 250, 350)])
+    page = page_with(browser, server, 'setup')
+    frames(page)
+    down = np.linspace(0, surface.height, 4000) - 0.5
+    true_px = in_whole(page, surface, surface.rays(299.5, down) @ nod.matrix.T)
+    drawn_px = close_to(page.shot('whole'), SEAM) + 0.5
+    apart = np.linalg.norm(drawn_px[:, None] - true_px[None], axis=-1)
+    assert len(drawn_px) > 200
+    assert apart.min(axis=1).max() < CLOSE_PX
 
 
 def test_a_seam_beyond_the_edge_of_a_ring_is_marked_where_it_comes_in(browser, serve):

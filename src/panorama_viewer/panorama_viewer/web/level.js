@@ -3,8 +3,13 @@
 import { Look } from '/look.js';
 
 export class Level {
+  constructor() {
+    this.rows = null; // of the rotation of the rays of the picture as it came to level ones
+  }
+
   /** Return the picture as it would be on the same surface, were it level; uses the bitmap up. */
   levelled(bitmap, projection, orientation) {
+    this.rows = null;
     // Frames side by side are at no true bearings by which they could be turned.
     if (!orientation || !projection || projection.repeats) return bitmap;
     try {
@@ -19,9 +24,16 @@ export class Level {
     if (canvas.width !== width || canvas.height !== height) {
       [canvas.width, canvas.height] = [width, height];
     }
-    this.look.turn(bitmap, projection, matrix(orientation));
+    this.rows = matrix(orientation);
+    this.look.turn(bitmap, projection, this.rows);
     bitmap.close();
     return canvas.transferToImageBitmap();
+  }
+
+  /** The ray at which the picture shows what it had at this one before it was levelled. */
+  ray([x, y, z]) {
+    if (!this.rows) return [x, y, z];
+    return [0, 3, 6].map((i) => this.rows[i] * x + this.rows[i + 1] * y + this.rows[i + 2] * z);
   }
 }
 

@@ -9,11 +9,13 @@ export function setup({ screen, sketch, state }) {
   const { projection } = screen;
   // A ray would not tell which of two columns is meant.
   if (projection.repeats) return;
+  const ray = (x, y) => screen.level.ray(projection.ray(x, y));
+  const column = (x) => sampled(0, projection.height, (y) => ray(x - 0.5, y - 0.5));
   const overlaps = (state.overlaps ?? []).filter((overlap) => overlap.seam_begin_px != null);
   for (const { seam_begin_px: begin, seam_end_px: end } of overlaps) {
-    sketch.line(column(projection, (begin + end) / 2), SEAM);
+    sketch.line(column((begin + end) / 2), SEAM);
     for (const edge of end > begin ? [begin, end] : []) {
-      sketch.line(column(projection, edge), SEAM, { width: 1.5, dash: [6, 6] });
+      sketch.line(column(edge), SEAM, { width: 1.5, dash: [6, 6] });
     }
   }
   const cameras = fields(overlaps, projection);
@@ -22,11 +24,16 @@ export function setup({ screen, sketch, state }) {
     // Of an odd ring the last one is beside the first: both have the same of two rows.
     const isThird = i === cameras.length - 1 && i % 2 === 0 && projection.wraps;
     const y = row(screen, ROOM * (isThird ? 3 : 1 + (i % 2)));
-    sketch.line(sampled(begin, end, (x) => projection.ray(x - 0.5, y)), color, { width: 3 });
+    // Of a levelled picture the column moves, but not the row: that may be the first one seen.
+    const bar = (x) => {
+      const [place] = projection.pixel(ray(x - 0.5, y)) ?? [x - 0.5];
+      return projection.ray(place, y);
+    };
+    sketch.line(sampled(begin, end, bar), color, { width: 3 });
     for (const edge of [begin, end]) {
-      sketch.line(column(projection, edge), color, { width: 1.5, dash: [3, 6] });
+      sketch.line(column(edge), color, { width: 1.5, dash: [3, 6] });
     }
-    sketch.words(projection.ray(middle(screen, begin, end) - 0.5, y), name, color);
+    sketch.words(bar(middle(screen, begin, end)), name, color);
   }
 }
 
@@ -49,11 +56,6 @@ function middle({ projection, mode, view }, begin, end) {
   const [x] = projection.pixel([Math.sin(view.yaw), 0, Math.cos(view.yaw)]) ?? [0];
   const beyond = [0, -turn, turn].find((aside) => begin <= x + aside && x + aside <= end) ?? 0;
   return Math.min(Math.max(x + beyond, begin), end);
-}
-
-/** Rays down the edge on the left of a column. */
-function column(projection, x) {
-  return sampled(0, projection.height, (y) => projection.ray(x - 0.5, y - 0.5));
 }
 
 /** Row of the panorama that is so far below the top of what is shown. */
