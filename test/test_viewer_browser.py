@@ -308,6 +308,25 @@ def test_a_surface_that_the_page_does_not_know_is_said(browser, serve):
     page.until(lambda: page.text('condition') == 'Live', 'a live picture')
 
 
+def test_pictures_without_a_projection_are_not_called_live(browser, serve):
+    server = serve(SURFACES[0], painted(SURFACES[0], 0, 0))
+    server.tell(projection=None)
+    page = Page(browser, server.url)
+
+    def told():
+        server.tell(rate_hz=5.0)
+        return page.text('problems')
+
+    page.until(told, 'words')
+    assert page.text('problems') == (
+        'pictures come, but panorama/projection does not: nothing can be shown'
+    )
+    assert page.text('condition') == 'Waiting for a picture'
+    server.tell(projection=described(SURFACES[0]))
+    page.until(lambda: page.text('condition') == 'Live', 'a live picture')
+    assert not page.text('problems')
+
+
 def moves(before, after):
     """Whether two pictures of one size differ by more than noise."""
     return before.shape == after.shape and abs(before.astype(int) - after).max() > 100

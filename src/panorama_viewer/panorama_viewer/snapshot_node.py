@@ -37,6 +37,7 @@ class SnapshotNode(Node):
     def __init__(self, **kwargs):
         super().__init__('snapshot', **kwargs)
         self.taken: Taken | None = None
+        self._missing = 'panorama', 'panorama/image'
         self._projections: StateHistory[Projection] = StateHistory()
         self.create_subscription(Projection, 'panorama/projection', self._place, LATCHED_INPUT)
         self._image = ImageSubscription(self, 'panorama/image', self._take)
@@ -45,6 +46,7 @@ class SnapshotNode(Node):
         self._projections.add(ns_of(message.header.stamp), message)
 
     def _take(self, image, encoding, header) -> None:
+        self._missing = 'projection of the panorama', 'panorama/projection'
         stamp_ns = ns_of(header.stamp)
         projection = self._projections.at(stamp_ns)
         if projection is None:
@@ -59,8 +61,9 @@ class SnapshotNode(Node):
         """Spin until a panorama was taken; a `SourceError` if none comes."""
         spin_until(self, lambda: self.taken is not None, timeout_s)
         if self.taken is None:
-            topic = self.resolve_topic_name('panorama/image')
-            raise SourceError(f'no panorama came on {topic} within {timeout_s:g} s')
+            what, name = self._missing
+            topic = self.resolve_topic_name(name)
+            raise SourceError(f'no {what} came on {topic} within {timeout_s:g} s')
         return self.taken
 
 

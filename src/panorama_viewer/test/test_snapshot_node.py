@@ -15,6 +15,7 @@ from fisheye_bridge.images import ImageBuffer
 from fisheye_bridge.projection import projection_of
 from fisheye_bridge.qos import IMAGE, LATCHED
 from fisheye_bridge.stamps import stamp_of
+from fisheye_core.errors import SourceError
 from fisheye_geometry.surface import Surface
 from panorama_viewer.snapshot_node import SnapshotNode, main, parse
 
@@ -52,6 +53,32 @@ def test_a_panorama_is_taken_with_its_surface_and_any_stamp(context, stamp_ns):
     taken, surface, taken_ns, wraps, _ = node.taken
     np.testing.assert_array_equal(taken, PANORAMA)
     assert (surface, taken_ns, wraps) == (SURFACE, stamp_ns, True)
+    for ended in (node, stitching):
+        ended.destroy_node()
+
+
+@pytest.mark.parametrize('other', [None, SURFACE.window(0, 0, 30, 12)], ids=['none', 'other'])
+def test_that_no_projection_of_the_panorama_came_is_said(context, other):
+    where = {'context': context, 'namespace': '/snapshot_test'}
+    node, stitching = SnapshotNode(**where), rclpy.create_node('stitch', **where)
+    projection = stitching.create_publisher(Projection, 'panorama/projection', LATCHED)
+    image = stitching.create_publisher(Image, 'panorama/image', IMAGE)
+    if other:
+        projection.publish(projection_of(other, Header(), wraps=False))
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    buffer = ImageBuffer(SURFACE.width, SURFACE.height, 'rgb8')
+    said = ''
+    for _ in range(SPINS):
+        image.publish(buffer.message)
+        executor.spin_once(timeout_sec=0.02)
+        with pytest.raises(SourceError) as raised:
+            node.wait(0.0)
+        said = str(raised.value)
+        if 'projection' in said:
+            break
+    topic = '/snapshot_test/panorama/projection'
+    assert said == f'no projection of the panorama came on {topic} within 0 s'
     for ended in (node, stitching):
         ended.destroy_node()
 

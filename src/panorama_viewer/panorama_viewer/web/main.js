@@ -100,12 +100,18 @@ const pictures = new Pictures({
     live.say('jpeg');
   },
 });
+const UNPLACED = 'pictures come, but panorama/projection does not: nothing can be shown';
+let hasPictures = false; // since the connection was opened
 const live = new Live(token, () => !status.obstacle, {
-  opened: () => pictures.reset(),
+  opened() {
+    hasPictures = false;
+    pictures.reset();
+  },
   state(state) {
     const problems = state.problems ?? [];
     try {
       if (state.projection) screen.place(state.projection);
+      else if (hasPictures) throw new Error(UNPLACED);
     } catch (error) {
       problems.push({ level: 'error', text: error.message });
     }
@@ -116,8 +122,9 @@ const live = new Live(token, () => !status.obstacle, {
   async picture(data, orientation) {
     const image = await pictures.image(data, screen.projection, screen.widest);
     if (!image) return;
+    hasPictures = true;
     await screen.show(image, orientation);
-    status.picture();
+    if (screen.projection) status.picture();
   },
   lost: (reason) => status.lose(reason),
   refused() {
