@@ -285,6 +285,24 @@ def test_a_phone_starts_by_looking_around(browser, serve):
     page.until(turned, 'a turn to the right')
 
 
+@pytest.mark.parametrize(('button', 'held'), [('right', 2), ('left', 1)])
+def test_the_picture_does_not_stick_to_a_mouse_without_a_button(browser, serve, button, held):
+    # A menu keeps the button's release from the page.
+    page = Page(browser, serve(SURFACES[0], painted(SURFACES[0], 0, 0)).url)
+    page.until(lambda: page.text('condition') == 'Live', 'a live picture')
+    page.press('v')
+    page.until(lambda: page.find('map').is_displayed(), 'the map')
+    for name in ('look', 'map'):
+        page.mouse('Pressed', name, 60, 30, button, held)
+        page.leave()
+        before_deg = page.bearing_deg
+        for x in (70, 90):
+            page.mouse('Moved', name, x, 30)
+        page.leave()
+        assert page.bearing_deg == before_deg
+        page.mouse('Released', name, 90, 30, button)
+
+
 def test_a_page_that_is_hidden_leaves_its_place(browser, serve):
     server = serve(SURFACES[0], painted(SURFACES[0], 0, 0))
     page = Page(browser, server.url)

@@ -80,6 +80,21 @@ class Page:
         self.point(name, x, y)
         ActionChains(self.driver, 0).click().perform()
 
+    def mouse(self, kind, name, x, y, button='none', held=0):
+        """Dispatch an event of the mouse at a place of an element; `held`: the buttons' bits."""
+        at = self.find(name).rect
+        self.driver.execute_cdp_cmd(
+            'Input.dispatchMouseEvent',
+            {
+                'type': f'mouse{kind}',
+                'x': at['x'] + x,
+                'y': at['y'] + y,
+                'button': button,
+                'buttons': held,
+                'clickCount': int(kind != 'Moved'),
+            },
+        )
+
     def leave(self):
         """Move the pointer off the picture."""
         ActionChains(self.driver, 0).move_to_element(self.find('condition')).perform()

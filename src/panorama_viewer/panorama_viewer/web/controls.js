@@ -20,10 +20,13 @@ export function dragTo(canvas, viewer) {
     return Math.hypot(a.clientX - b.clientX, a.clientY - b.clientY);
   };
   canvas.addEventListener('pointerdown', (event) => {
+    if (event.button) return;
     canvas.setPointerCapture(event.pointerId);
     fingers.set(event.pointerId, event);
   });
   canvas.addEventListener('pointermove', (event) => {
+    // A menu may have kept its end from us.
+    if (!event.buttons) fingers.delete(event.pointerId);
     const last = fingers.get(event.pointerId);
     if (!last) return;
     const before = fingers.size > 1 ? spread() : 0;
@@ -50,11 +53,12 @@ export function wheelTo(canvas, viewer) {
 export function pressTo(canvas, viewer) {
   const look = (event) => viewer.lookAt(canvas, inside(canvas, event));
   canvas.addEventListener('pointerdown', (event) => {
+    if (event.button) return;
     canvas.setPointerCapture(event.pointerId);
     look(event);
   });
   canvas.addEventListener('pointermove', (event) => {
-    if (canvas.hasPointerCapture(event.pointerId)) look(event);
+    if (event.buttons && canvas.hasPointerCapture(event.pointerId)) look(event);
   });
 }
 
