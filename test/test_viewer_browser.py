@@ -303,6 +303,23 @@ def test_the_picture_does_not_stick_to_a_mouse_without_a_button(browser, serve, 
         page.mouse('Released', name, 90, 30, button)
 
 
+def test_a_drag_straight_up_turns_no_faster_than_one_can_follow(browser, serve):
+    surface = Surface('equirectangular', 1300, 754, 240.0, 649.5, 376.5)
+    page = Page(browser, serve(surface, painted(surface, 0, 0)).url)
+    page.until(lambda: page.text('condition') == 'Live', 'a live picture')
+    page.press('v' + Keys.ARROW_UP * 12)
+    page.until(lambda: page.text('bearing').endswith('90.0° up'), 'a look straight up')
+    page.mouse('Pressed', 'look', 200, 50, 'left', 1)
+    page.mouse('Moved', 'look', 190, 50, 'left', 1)
+    page.mouse('Released', 'look', 190, 50, 'left')
+    page.press(Keys.ARROW_DOWN * 10)
+    page.leave()
+    focal_px = page.find('look').size['width'] / 2
+    turned_deg = math.degrees(10 / focal_px / 0.2)
+    page.until(lambda: page.text('bearing').endswith(' · 0.0°'), 'a look at the horizon')
+    assert page.bearing_deg == pytest.approx(turned_deg, abs=0.1)
+
+
 def test_a_page_that_is_hidden_leaves_its_place(browser, serve):
     server = serve(SURFACES[0], painted(SURFACES[0], 0, 0))
     page = Page(browser, server.url)

@@ -10,6 +10,7 @@ import { Status } from '/status.js';
 import { Token } from '/token.js';
 
 const $ = (id) => document.getElementById(id);
+const LEAST_COSINE = 0.2; // of the pitch: nearer to the zenith a drag would turn ever faster
 
 /** What pointer and keys can do. */
 class Viewer {
@@ -39,7 +40,7 @@ class Viewer {
 
   drag(right, down) {
     const { view, focal } = this.screen;
-    this.turn(-right / focal / Math.cos(view.pitch), down / focal);
+    this.turn(-right / focal / Math.max(Math.cos(view.pitch), LEAST_COSINE), down / focal);
   }
 
   /** Turn by shares of the view. */
