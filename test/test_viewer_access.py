@@ -9,7 +9,7 @@ import viewer_page
 from selenium.webdriver import Keys
 from viewer_page import SURFACES, Page, painted
 
-serve = viewer_page.serve  # its fixture
+serve, before_the_page = viewer_page.serve, viewer_page.before_the_page  # its fixtures
 
 ATTACK = Path(__file__).parents[1] / 'src/panorama_viewer/test/attack.py'
 
@@ -58,6 +58,23 @@ def test_the_address_with_the_token_opens_the_page(browser, serve, copied_with_i
     page = Page(browser, f'{url}#token={token}{copied_with_it}')
     page.until(lambda: page.text('condition') == 'Live', 'a live picture')
     assert token not in browser.current_url
+
+
+def test_a_browser_that_keeps_nothing_for_sites_looks_all_the_same(
+    browser, serve, before_the_page
+):
+    before_the_page("""
+      for (const name of ['localStorage', 'sessionStorage']) {
+        const get = () => { throw new DOMException('blocked', 'SecurityError'); };
+        Object.defineProperty(window, name, { get });
+      }
+    """)
+    server = serve(SURFACES[0], painted(SURFACES[0], 0, 0), host='0.0.0.0')
+    url, token = elsewhere(server)
+    page = Page(browser, f'{url}#token={token}')
+    page.until(lambda: page.text('condition') == 'Live', 'a live picture')
+    page.press('d')
+    assert 'edges' in page.aids
 
 
 @pytest.mark.parametrize('kind', ['silent', 'idle', 'drawn'])

@@ -18,23 +18,7 @@ from panorama_viewer.address import is_loopback, reachable
 from panorama_viewer.settings import ViewerSettings
 from panorama_viewer.tls import tls_of
 
-serve = viewer_page.serve  # its fixture
-
-
-@pytest.fixture
-def before_the_page(browser):
-    """Return a function that has JavaScript run in every page before the page's own."""
-    scripts = []
-
-    def add(source):
-        answer = browser.execute_cdp_cmd(
-            'Page.addScriptToEvaluateOnNewDocument', {'source': source}
-        )
-        scripts.append(answer)
-
-    yield add
-    for script in scripts:
-        browser.execute_cdp_cmd('Page.removeScriptToEvaluateOnNewDocument', script)
+serve, before_the_page = viewer_page.serve, viewer_page.before_the_page  # its fixtures
 
 
 def format_of(page):

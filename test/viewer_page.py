@@ -162,6 +162,22 @@ def serve():
     assert not faults
 
 
+@pytest.fixture
+def before_the_page(browser):
+    """Return a function that has JavaScript run in every page before the page's own."""
+    scripts = []
+
+    def add(source):
+        answer = browser.execute_cdp_cmd(
+            'Page.addScriptToEvaluateOnNewDocument', {'source': source}
+        )
+        scripts.append(answer)
+
+    yield add
+    for script in scripts:
+        browser.execute_cdp_cmd('Page.removeScriptToEvaluateOnNewDocument', script)
+
+
 def page_of(rig, browser, **size):
     """Start the viewer beside a rig and open its page."""
     rig.start('viewer', port=0)

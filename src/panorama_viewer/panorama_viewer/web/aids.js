@@ -11,9 +11,10 @@ import { heading } from '/heading.js';
 import { rear } from '/rear.js';
 import { setup } from '/setup.js';
 import { Sketch } from '/sketch.js';
+import { store } from '/store.js';
 
 const $ = (id) => document.getElementById(id);
-const STORE = 'aids';
+const KEY = 'aids';
 const AT_FIRST = 'heading';
 
 /**
@@ -34,7 +35,8 @@ export class Aids {
     this.screen = screen;
     this.state = {};
     this.sketch = new Sketch($('sketch'));
-    this.on = new Set((localStorage.getItem(STORE) ?? AT_FIRST).split(' '));
+    this.store = store('localStorage');
+    this.on = new Set((this.store.getItem(KEY) ?? AT_FIRST).split(' '));
     this.buttons = new Map(AIDS.map((aid) => [aid.name, this.button(aid)]));
     $('aids').replaceChildren(...this.buttons.values());
     $('help').addEventListener('click', () => {
@@ -63,7 +65,7 @@ export class Aids {
 
   toggle(aid) {
     if (!this.on.delete(aid.name)) this.on.add(aid.name);
-    localStorage.setItem(STORE, [...this.on].join(' '));
+    this.store.setItem(KEY, [...this.on].join(' '));
     const lack = this.on.has(aid.name) && aid.lack?.(this.state);
     if (lack) say(lack);
     this.show();

@@ -1,5 +1,7 @@
 // The token that looking and the buttons may need: from the address, or typed.
 
+import { store } from '/store.js';
+
 const $ = (id) => document.getElementById(id);
 const KEY = 'token';
 
@@ -11,6 +13,7 @@ export class Token {
   constructor(given) {
     this.given = given;
     this.asking = null;
+    this.store = store('sessionStorage');
     this.take();
     window.addEventListener('hashchange', () => this.take() && this.given());
   }
@@ -19,19 +22,19 @@ export class Token {
   take() {
     const token = cleaned(new URLSearchParams(location.hash.slice(1)).get(KEY) ?? '');
     if (!token) return false;
-    sessionStorage.setItem(KEY, token);
+    this.store.setItem(KEY, token);
     history.replaceState(null, '', location.pathname);
     return true;
   }
 
   /** The token, '' if none is known. */
   get value() {
-    return sessionStorage.getItem(KEY) ?? '';
+    return this.store.getItem(KEY) ?? '';
   }
 
   /** Forget a token that was refused. */
   forget() {
-    sessionStorage.removeItem(KEY);
+    this.store.removeItem(KEY);
   }
 
   /** Ask for the token; gives '' if nobody types one. */
@@ -48,7 +51,7 @@ export class Token {
     await new Promise((closed) => { dialog.onclose = closed; });
     const typed = cleaned($('token').value);
     if (dialog.returnValue !== 'use' || !typed) return '';
-    sessionStorage.setItem(KEY, typed);
+    this.store.setItem(KEY, typed);
     this.given();
     return typed;
   }
