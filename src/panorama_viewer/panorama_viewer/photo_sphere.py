@@ -3,11 +3,13 @@
 An equirectangular JPEG with the GPano tags by which viewers of photo spheres know its place.
 """
 
-from math import atan, atan2, ceil, floor, hypot, pi
+from dataclasses import replace
+from math import atan, atan2, ceil, degrees, floor, hypot, pi
 
 import cv2
 import numpy as np
 
+from fisheye_core.errors import GeometryError
 from fisheye_geometry.attitude import LEVEL, Attitude, attitude_of
 from fisheye_geometry.remap import RemapTable
 from fisheye_geometry.surface import Surface
@@ -38,12 +40,21 @@ def gpano(
 
     The tags are those of Google's Photo Sphere XMP Metadata. One that `wraps` is all around the
     sphere, without a gap at its edges.
+
+    Raises
+    ------
+    GeometryError
+        If the panorama is wider than 360 degrees.
     """
     turn = attitude_of(*orientation) if orientation else LEVEL
     if wraps:
         image, surface = _repeated(image, surface)
-    sphere, left_px, top_px = on_sphere(surface, turn)
-    equirectangular = RemapTable(surface, sphere, 'cubic', turn)(image)
+        parts = [surface]
+    else:
+        parts = _parts(surface)
+    sphere, left_px, top_px = on_sphere(parts[0], turn)
+    drawn = [RemapTable(part, sphere, 'cubic', turn)(image) for part in parts]
+    equirectangular = np.maximum.reduce(drawn)  # black where nothing is seen
     quality = (cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY)
     jpeg = cv2.imencode('.jpg', equirectangular, quality)[1].tobytes()
     full_px = round(2 * pi * sphere.focal_px)
@@ -67,17 +78,33 @@ def _repeated(image: np.ndarray, surface: Surface) -> tuple[np.ndarray, Surface]
     return image, surface.window(-beyond_px, 0, image.shape[1], surface.height)
 
 
+def _parts(surface: Surface) -> list[Surface]:
+    """Return a surface once for each turn, by which its rays have bearings within 180 degrees."""
+    around_px = surface.circumference_px
+    if surface.width - 1 > around_px:
+        raise GeometryError(
+            f'the panorama is {degrees(surface.width / surface.focal_px):.0f} degrees wide, as '
+            'frames side by side are; expected at most the 360 of a photo sphere'
+        )
+    if not surface.yaw_is_column_shift:
+        return [surface]
+    x = surface.center_x_px
+    left, right = ((edge - x) / around_px for edge in (-0.5, surface.width - 0.5))
+    turns = range(floor(left + 0.5), ceil(right - 0.5) + 1)
+    return [replace(surface, center_x_px=x + turn * around_px) for turn in turns]
+
+
 def on_sphere(surface: Surface, turn: Attitude = LEVEL) -> tuple[Surface, int, int]:
     """Return the equirectangular part of the sphere that a panorama covers.
 
     Its scale is the panorama's own, rounded so that the sphere is a whole and even number of
-    pixels around; bearing 0 is in the middle of the sphere. What a panorama holds beyond 180
-    degrees to a side is left out. A panorama that is turned against the level covers more of it.
+    pixels around; bearing 0 is in the middle of the sphere. A panorama that goes beyond 180
+    degrees to a side has all its width. One that is turned against the level covers more of it.
 
     Returns
     -------
     surface : Surface
-        The part, without columns or rows that are not covered to their middle.
+        The part, without columns or rows at its edges that are not covered to their middle.
     left_px, top_px : int
         Where the part begins on the whole sphere.
     """
@@ -87,10 +114,12 @@ def on_sphere(surface: Surface, turn: Attitude = LEVEL) -> tuple[Surface, int, i
         angle * focal_px + around_px / share
         for angle, share in zip(_limits(surface, turn), (2, 2, 4, 4), strict=True)
     )
-    left_px, top_px = max(ceil(left), 0), max(ceil(top), 0)
+    if left < 0 or right > around_px:
+        left, right = 0, around_px
+    left_px, top_px = ceil(left), max(ceil(top), 0)
     part = Surface(
         'equirectangular',
-        width=min(floor(right), around_px) - left_px,
+        width=floor(right) - left_px,
         height=min(floor(bottom), around_px // 2) - top_px,
         focal_px=focal_px,
         center_x_px=around_px / 2 - 0.5 - left_px,
@@ -125,11 +154,12 @@ def _turned_limits(surface: Surface, turn: Attitude) -> tuple[float, ...]:
         before_full = (columns - surface.center_x_px) / surface.focal_px
     else:
         before_full = before
-    # Not past the back: how far a bearing is turned is less than half around.
+    # How far a bearing is turned is less than half around.
     bearings = before_full + (after - before + pi) % (2 * pi) - pi
     down = np.arctan2(level[:, 1], np.hypot(level[:, 0], level[:, 2]))
-    sides = max(bearings.min(), -pi), min(bearings.max(), pi)
-    return *map(float, sides), float(down.min()), float(down.max())
+    return tuple(
+        float(limit) for limit in (bearings.min(), bearings.max(), down.min(), down.max())
+    )
 
 
 def with_xmp(jpeg: bytes, tags: dict[str, object]) -> bytes:

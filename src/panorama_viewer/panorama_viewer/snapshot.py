@@ -61,6 +61,8 @@ def save(
     ------
     FileAccessError
         If a file cannot be written.
+    GeometryError
+        If the panorama is wider than 360 degrees, as `gpano`.
     """
     if os.path.isdir(path):
         path /= 'panorama'

@@ -8,7 +8,7 @@ import pytest
 from fisheye_msgs.msg import Projection
 
 from fisheye_bridge.projection import surface_of
-from fisheye_core.errors import FileAccessError
+from fisheye_core.errors import FileAccessError, GeometryError
 from fisheye_geometry.attitude import Attitude, quaternion
 from fisheye_geometry.surface import Surface
 from panorama_viewer.photo_sphere import gpano, on_sphere
@@ -20,8 +20,12 @@ SURFACES = [
     Surface('equirectangular', 900, 400, 160.0, 450.0, 190.0),
     Surface('rectilinear', 700, 400, 300.0, 340.0, 210.0),
 ]
-WHOLE = Surface('equirectangular', 1200, 500, 180.0, 600.0, 250.0)
-"""Wider than the sphere."""
+REAR_PX = 1200 / np.radians(270)
+REAR = [
+    Surface(kind, 1200, 480, REAR_PX, 599.5 - np.radians(middle_deg) * REAR_PX, 240.0)
+    for kind, middle_deg in (('cylindrical', 180), ('equirectangular', 180), ('cylindrical', -200))
+]
+"""Around what is behind the robot."""
 CLOSED = [
     Surface(kind, width, 300, width / (2 * np.pi), center_x_px, 140.0)
     for kind in ('cylindrical', 'equirectangular')
@@ -79,7 +83,7 @@ def test_a_direction_is_where_photo_sphere_viewers_look_for_it(surface):
     assert y == pytest.approx((0.5 - height / np.pi) * upright, abs=CLOSE_PX)
 
 
-@pytest.mark.parametrize('surface', [*SURFACES, WHOLE])
+@pytest.mark.parametrize('surface', SURFACES, ids=lambda surface: surface.kind)
 def test_the_part_lies_within_the_sphere_and_is_covered(surface):
     part, left_px, top_px = on_sphere(surface)
     around_px = round(2 * np.pi * part.focal_px)
@@ -92,6 +96,40 @@ def test_the_part_lies_within_the_sphere_and_is_covered(surface):
     image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_GRAYSCALE)
     assert image[middle].min() > 150, 'no black columns'
     assert image[:, round(part.center_x_px)].min() > 150, 'no black rows'
+
+
+@pytest.mark.parametrize('nod', [None, Attitude(0.0, 0.1, -0.1)], ids=['level', 'nodding'])
+@pytest.mark.parametrize('surface', REAR)
+def test_what_is_behind_the_robot_is_at_both_sides_of_the_sphere(surface, nod):
+    bearings = np.radians((-165.0, 150.0))
+    image = np.zeros((surface.height, surface.width, 3), np.uint8)
+    for bearing in bearings:
+        direction = np.array([np.sin(bearing), 0.0, np.cos(bearing)])
+        image |= spotted(surface, nod.matrix.T @ direction if nod else direction)
+    jpeg = gpano(image, surface, orientation=quaternion(nod) if nod else None)
+    full_px = int(xmp(jpeg)['FullPanoWidthPixels'])
+    sphere = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_GRAYSCALE).astype(float)
+    assert sphere.shape[1] == full_px
+    sphere[sphere < 40] = 0
+    for bearing in bearings:
+        true_px = (0.5 + bearing / (2 * np.pi)) * full_px
+        near = slice(round(true_px) - 20, round(true_px) + 20)
+        columns = np.arange(full_px)[near] + 0.5
+        assert np.average(columns, weights=sphere[:, near].sum(axis=0)) == pytest.approx(
+            true_px, abs=CLOSE_PX
+        )
+    white = np.full_like(image, 255)
+    jpeg = gpano(white, surface)
+    seen = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_GRAYSCALE)[120:360] > 128
+    assert seen.all(axis=0).sum() == pytest.approx(surface.width, abs=2)
+    assert not seen.any(axis=0).all(), 'black where no camera looks'
+
+
+def test_frames_side_by_side_are_refused_as_a_photo_sphere(tmp_path):
+    surface = Surface('equirectangular', 1200, 500, 180.0, 600.0, 250.0)
+    with pytest.raises(GeometryError, match='is 382 degrees wide'):
+        save(tmp_path / 'here', 'gpano', np.zeros((500, 1200)), surface, STAMP_NS)
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize('surface', CLOSED, ids=lambda s: f'{s.kind} {s.width} {s.center_x_px}')
