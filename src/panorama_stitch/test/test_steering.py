@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from known_rigs import PAIR, RING, STAMP_NS, camera_at, drawn, rig_of
+from known_rigs import PAIR, RING, STAMP_NS, camera_at, deg, drawn, rig_of
 
 from fisheye_core.errors import SettingError
 from panorama_stitch.pipeline.live_view import LiveView
@@ -53,6 +53,22 @@ def test_it_goes_no_farther_than_the_rig_sees(pair):
         camera = steering.at(LONG * STEP_NS, compositor.layout)
         if np.degrees(camera.hfov_rad) < 100:
             assert drawn(compositor, images, camera)[0].seen_share > 0.999, angles
+
+
+def test_what_is_behind_the_robot_is_reached_without_a_look_elsewhere():
+    compositor, images = rig_of((deg(110, 0, 0), deg(-110, 0, 0)))
+    steering = Steering(camera_at(120, 0, 60))
+    steering.look(*np.radians((-130, -8, 40)))
+    angles = way(steering, compositor.layout)
+    assert angles[-1] == pytest.approx([-130, -8, 40])
+    assert (np.diff(angles[:, 0] % 360) >= 0).all(), 'past the back'
+    for yaw_deg in (-20, 20):
+        steering.look(*np.radians((yaw_deg, 0, 60)))
+        way(steering, compositor.layout)
+        camera = steering.at(LONG * STEP_NS, compositor.layout)
+        assert -180 <= np.degrees(camera.yaw_rad) < 180
+        assert drawn(compositor, images, camera)[0].seen_share > 0.999
+        assert np.sign(camera.yaw_rad) == np.sign(yaw_deg)
 
 
 def test_around_a_ring_it_takes_the_short_way(ring):

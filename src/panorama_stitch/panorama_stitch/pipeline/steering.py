@@ -53,9 +53,12 @@ class Steering:
         since_s = (stamp_ns - self._stamp_ns) * 1e-9 if self._stamp_ns is not None else 0.0
         self._stamp_ns = stamp_ns
         since_s = max(0.0, min(since_s, _LONGEST_STEP_S))
-        yaw_rad = aim.yaw_rad - self._now.yaw_rad
+        if layout.wraps:
+            yaw_rad = _around(aim.yaw_rad - self._now.yaw_rad)
+        else:
+            yaw_rad = _in_panorama(aim, layout) - _in_panorama(self._now, layout)
         way = (
-            _around(yaw_rad) if layout.wraps else yaw_rad,
+            yaw_rad,
             aim.pitch_rad - self._now.pitch_rad,
             aim.hfov_rad - self._now.hfov_rad,
         )
@@ -88,11 +91,19 @@ def limited(camera: VirtualCamera, layout: Layout) -> VirtualCamera:
     pitch_rad = _between(camera.pitch_rad, bottom + atan(tall), top - atan(tall))
     yaw_rad = camera.yaw_rad
     if not layout.wraps:
+        yaw_rad = _in_panorama(camera, layout)
         # The corners that are nearer to the zenith or nadir reach farther to the sides.
         ahead = cos(pitch_rad) - tall * sin(abs(pitch_rad))
         side_rad = atan2(tan(hfov_rad / 2), ahead)
-        yaw_rad = _between(yaw_rad, left + side_rad, right - side_rad)
+        yaw_rad = _around(_between(yaw_rad, left + side_rad, right - side_rad))
     return replace(camera, yaw_rad=yaw_rad, pitch_rad=pitch_rad, hfov_rad=hfov_rad)
+
+
+def _in_panorama(camera: VirtualCamera, layout: Layout) -> float:
+    """Return a camera's yaw as the panorama counts it: at most half around from its middle."""
+    surface = layout.surface
+    middle_rad = ((surface.width - 1) / 2 - surface.center_x_px) / surface.focal_px
+    return middle_rad + _around(camera.yaw_rad - middle_rad)
 
 
 def _between(value: float, low: float, high: float) -> float:
