@@ -48,6 +48,33 @@ def test_where_the_sky_is_clipped_white_stays_white():
     assert (factors[1] == 1.0).all()
 
 
+def test_a_sky_that_comes_later_becomes_white_and_what_follows_it_dark_again_without_a_jump():
+    dim = pictures(0.35, 0.7)
+    under_the_sky = [image.copy() for image in dim]
+    for image in under_the_sky:
+        image[: len(image) // 2] = 255
+    gain, levels = GainCompensation(LAYOUT, PLACED, dim), []
+    for images, reference, other in ((dim, 0, 0.5), (under_the_sky, 1, 2.0), (dim, 0, 0.5)):
+        for _ in range(240):
+            gain.update(images)
+            levels.append(np.log(gain.factors[:, 0]))
+        assert gain.factors[reference] == pytest.approx(np.ones(3), rel=RIGHT)
+        assert gain.factors[1 - reference] == pytest.approx(np.full(3, other), rel=2 * RIGHT)
+    assert np.abs(np.diff(levels, axis=0)).max() < np.log(2.0) / 5
+
+
+def test_a_little_white_changes_nothing_that_was_chosen_before():
+    dim = pictures(0.35, 0.7)
+    gain = GainCompensation(LAYOUT, PLACED, dim)
+    for rows, reference in ((4, 0), (120, 1), (4, 1)):
+        images = [image.copy() for image in dim]
+        for image in images:
+            image[60 : 60 + rows] = 255
+        for _ in range(240):
+            gain.update(images)
+        assert gain.factors[reference] == pytest.approx(np.ones(3), rel=RIGHT)
+
+
 def test_a_tint_is_taken_out():
     tint = np.array([0.9, 1.0, 1.08])
     gain = GainCompensation(LAYOUT, PLACED, pictures(right=tint))

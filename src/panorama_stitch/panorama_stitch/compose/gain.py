@@ -14,13 +14,15 @@ from panorama_stitch.compose.brightness import BrightnessRatio
 from panorama_stitch.compose.layout import Layout, neighbours
 from panorama_stitch.compose.placed import Placed
 
-_CLIPPED_SHARE = 0.02
-"""Of the samples, from which on white has to stay white."""
+_CLIPPED_SHARE, _UNCLIPPED_SHARE = 0.02, 0.005
+"""Of the samples: above the first white has to stay white, until it is no more than the second."""
 _EVERY = 8
 """Panoramas from one comparison to the next."""
 _SMALLEST_CHANGE, _SMALLEST_TINT = 0.002, 0.01
 """Factors that differ less from 1 are not worth the time; and from each other."""
 _LARGEST_FACTOR = 4.0
+_SLIDE = 0.85
+"""What is left, from one comparison to the next, of the way to the factors of another choice."""
 _UNKNOWN = 1e-3
 """Weight in a ring of a pair that was never compared."""
 _ROWS = 64
@@ -50,19 +52,15 @@ class GainCompensation:
         self._age = 0
         for pair in self._pairs:
             pair.compare(group)
-        # Where nothing is clipped the brighter pictures are darkened, so that nothing will be.
-        # Where the sky is, darkened white would be grey, and a change of colour would tint it.
-        is_clipped = any(pair.clipped > _CLIPPED_SHARE for pair in self._pairs)
-        self._in_color = not is_clipped
-        needed = self._needed().mean(axis=1)
-        self._reference = int(needed.argmin() if is_clipped else needed.argmax())
+        self._is_clipped, self._reference = False, 0
+        self._choose()
+        self._way = np.zeros_like(self._needed())
         self._use_needed()
 
     @property
     def factors(self) -> np.ndarray:
         """(cameras, channels): what the pictures of each camera are multiplied by."""
-        factors = self._needed()
-        factors = np.exp(factors - factors[self._reference])
+        factors = np.exp(self._needed() + self._way)
         return factors.clip(1 / _LARGEST_FACTOR, _LARGEST_FACTOR)
 
     def update(self, images: Sequence[np.ndarray]) -> None:
@@ -71,20 +69,35 @@ class GainCompensation:
         if not self._age:
             for pair in self._pairs:
                 pair.compare(images)
+            before = self._needed()
+            self._choose()
+            self._way = _SLIDE * (self._way + before - self._needed())
             self._use_needed()
 
     def apply(self, index: int, drawn: np.ndarray) -> None:
         """Multiply rows of the panorama in which camera `index` is drawn by its factors."""
         self._multipliers[index](drawn)
 
+    def _choose(self) -> None:
+        """Choose the camera that is left as it is, and whether white has to stay white."""
+        # Where nothing is clipped the brighter pictures are darkened, so that nothing will be.
+        # Where the sky is, darkened white would be grey, and a change of colour would tint it.
+        limit = _UNCLIPPED_SHARE if self._is_clipped else _CLIPPED_SHARE
+        self._is_clipped = any(pair.clipped > limit for pair in self._pairs)
+        needed = self._needed().mean(axis=1)
+        best = int(needed.argmin() if self._is_clipped else needed.argmax())
+        if abs(needed[best]) > _SMALLEST_TINT:  # of two that are alike it stays the same one
+            self._reference = best
+
     def _needed(self) -> np.ndarray:
-        """(cameras, channels) logarithms of factors that make all as bright as the first."""
+        """(cameras, channels) logarithms of factors that make all as bright as the reference."""
         ratios = np.stack([pair.log_ratio for pair in self._pairs])
-        if not self._in_color:
+        if self._is_clipped:
             ratios = np.broadcast_to(ratios.mean(axis=1, keepdims=True), ratios.shape)
         weights = [1.0 if pair.is_known else _UNKNOWN for pair in self._pairs]
         cameras = [pair.cameras for pair in self._pairs]
-        return _solution(cameras, weights, len(self._multipliers)) @ ratios
+        needed = _solution(cameras, weights, len(self._multipliers)) @ ratios
+        return needed - needed[self._reference]
 
     def _use_needed(self) -> None:
         for multiplier, factors in zip(self._multipliers, self.factors, strict=True):
