@@ -138,7 +138,7 @@ def test_pictures_that_are_not_live_teach_nothing_about_brightness(pictures):
     out = np.empty((layout.surface.height, layout.surface.width, 3), np.uint8)
     before = compositor.gain.factors
     for _ in range(50):
-        compositor.compose([pictures[0] // 3, pictures[1]], out, are_live=False)
+        compositor.compose([pictures[0] // 3, pictures[1]], out, stale=[0])
     np.testing.assert_array_equal(compositor.gain.factors, before)
 
 
@@ -151,7 +151,7 @@ def test_a_picture_that_is_not_live_does_not_change_the_gain(pictures):
     out = np.empty((layout.surface.height, layout.surface.width, 3), np.uint8)
     dimmed = [pictures[0], pictures[1] // 2]
     for _ in range(60):
-        compositor.compose(dimmed, out, are_live=False)
+        compositor.compose(dimmed, out, stale=[1])
     assert gain.factors == pytest.approx(np.ones((2, 3)), rel=0.01)
     for _ in range(60):
         compositor.compose(dimmed, out)
@@ -288,7 +288,7 @@ def test_flow_shows_the_scene_and_fades_where_it_may_not_or_has_no_time(
     feather.compose(images, faded)
     compositor.compose(images, out)
     assert psnr(out, faded, np.s_[:]) > FAITHFUL_DB
-    for options in ({'economical': True}, {'are_live': False}):
+    for options in ({'economical': True}, {'stale': [1]}):
         compositor.compose(images, out, **options)
         assert np.abs(out.astype(int) - faded).max() <= 1
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from known_rigs import rig_of
 from scenes import placed_at
 
 from fisheye_capture.scene import Scene
@@ -12,6 +13,7 @@ from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.compose.gain import GainCompensation
 from panorama_stitch.compose.layout import lay_out
 from panorama_stitch.compose.view import View
+from panorama_stitch.pipeline.panorama import Panorama
 
 YAW = np.radians(140)
 LENS = synthetic_lens(320, 240, np.radians(170))
@@ -166,6 +168,25 @@ def test_a_camera_that_shows_nothing_is_left_out():
     )
     factors = GainCompensation(layout, placed, [left, middle, np.zeros_like(left)]).factors[:, 0]
     assert factors == pytest.approx([0.9 / 1.1, 1.0, 1.0], rel=RIGHT)
+
+
+@pytest.mark.parametrize('is_drawn', [True, False])
+def test_beside_a_silent_camera_the_living_ones_are_still_evened_out(is_drawn):
+    compositor, images = rig_of([Attitude(yaw_rad=np.radians(yaw)) for yaw in (-120, 0, 120)])
+    surface = compositor.layout.surface
+    out = np.empty((surface.height, surface.width, 3), np.uint8)
+    now = [images[0], images[1] // 2, images[2] // 3]
+    panorama = Panorama(
+        compositor, now, 0, 'bgr8', {'right': ((0, 0), 9.0)}, stale_cameras=frozenset({2})
+    )
+    for _ in range(160):
+        if is_drawn:
+            panorama.draw(out)
+        else:
+            panorama.expose()
+    left, middle, right = compositor.gain.factors.mean(axis=1)
+    assert left / middle == pytest.approx(0.5, rel=2 * RIGHT)
+    assert right / middle == pytest.approx(1.0, rel=RIGHT), 'as it was when it fell silent'
 
 
 def test_without_a_common_scene_nothing_is_changed():

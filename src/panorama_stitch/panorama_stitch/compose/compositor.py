@@ -1,6 +1,6 @@
 """Composing: the cameras' pictures drawn straight into the panorama."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
@@ -87,7 +87,7 @@ class Compositor:
         images: Sequence[np.ndarray],
         out: np.ndarray,
         *,
-        are_live: bool = True,
+        stale: Collection[int] = (),
         economical: bool = False,
     ) -> None:
         """Draw a panorama.
@@ -98,9 +98,9 @@ class Compositor:
             A picture of each camera, (height, width[, channels]) uint8.
         out
             (surface.height, surface.width[, channels]) uint8, overwritten.
-        are_live
-            Whether the pictures tell anything of the cameras now: their brightness does not count
-            otherwise, and they only fade.
+        stale
+            Indices of cameras whose pictures tell nothing of now: their brightness does not
+            count, and where there are any, all only fade.
         economical
             Leave out what takes long in blends.
 
@@ -110,19 +110,18 @@ class Compositor:
             If a picture has not the size that its view was made for.
         """
         gain = self.gain_for(out)
-        if are_live:
-            self.expose(images)
+        self.expose(images, stale)
         for fade in self._fades:
             fade.expect(out)
         run_parallel([partial(self._draw, parts, images, out, gain) for parts in self._parts])
         for fade in self._fades:
             if not fade.is_local:
-                fade.blend(_ALL_ROWS, out, economical=economical or not are_live)
+                fade.blend(_ALL_ROWS, out, economical=economical or bool(stale))
 
-    def expose(self, images: Sequence[np.ndarray]) -> None:
-        """Let the gain follow live pictures, one of each camera; `compose` does so by itself."""
+    def expose(self, images: Sequence[np.ndarray], stale: Collection[int] = ()) -> None:
+        """Let the gain follow pictures, as `GainCompensation.update`; `compose` does it itself."""
         if gain := self.gain_for(images[0]):
-            gain.update(images)
+            gain.update(images, stale)
 
     def gain_for(self, image: np.ndarray) -> GainCompensation | None:
         """Return what evens out the brightness of pictures with the channels of this one."""

@@ -5,7 +5,7 @@ https://doi.org/10.1007/s11263-006-0002-3, section 6; but one camera is left as 
 its share of the work.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import cv2
 import numpy as np
@@ -63,12 +63,16 @@ class GainCompensation:
         factors = np.exp(self._needed() + self._way)
         return factors.clip(1 / _LARGEST_FACTOR, _LARGEST_FACTOR)
 
-    def update(self, images: Sequence[np.ndarray]) -> None:
-        """Follow the pictures, one of each camera, that are about to be drawn."""
+    def update(self, images: Sequence[np.ndarray], stale: Collection[int] = ()) -> None:
+        """Follow the pictures, one of each camera, that are about to be drawn.
+
+        The brightness of `stale` cameras, told by their indices, does not count.
+        """
         self._age = (self._age + 1) % _EVERY
         if not self._age:
             for pair in self._pairs:
-                pair.compare(images)
+                if not set(pair.cameras) & set(stale):
+                    pair.compare(images)
             before = self._needed()
             self._choose()
             self._way = _SLIDE * (self._way + before - self._needed())

@@ -58,12 +58,11 @@ class Panorama:
             If an image is not of the size that its camera is known to give.
         """
         self.compositor.compose(
-            self.images, out, are_live=not self.stale, economical=self.is_economical
+            self.images, out, stale=self.stale_cameras, economical=self.is_economical
         )
         for camera, (columns, age_s) in self.stale.items():
             write_age(out, columns, camera, age_s)
 
     def expose(self) -> None:
         """Follow the brightness of the images, where the panorama itself is not drawn."""
-        if not self.stale:
-            self.compositor.expose(self.images)
+        self.compositor.expose(self.images, self.stale_cameras)
