@@ -78,6 +78,22 @@ def test_a_seam_has_the_blend_of_the_panorama(blend):
     assert (steepest > A_STEP) == (blend == 'none')
 
 
+@pytest.mark.parametrize('moves', [False, True])
+@pytest.mark.parametrize('turn_deg', [0, 180, -180])
+def test_cameras_meet_at_the_seam_where_an_open_panorama_reaches_past_180_degrees(turn_deg, moves):
+    turned = [replace(each, yaw_rad=each.yaw_rad + np.radians(turn_deg)) for each in PAIR]
+    compositor, images = rig_of(turned)
+    surface, ((begin, end),) = compositor.layout.surface, compositor.layout.seams
+    images = [images[0], (images[1] * 0.8).astype(np.uint8)]
+    seam_rad = ((begin + end - 1) / 2 - surface.center_x_px) / surface.focal_px
+    camera = camera_at(np.degrees(seam_rad), 0, 20, (320, 240))
+    out = drawn(compositor, images, camera, moves=moves)[1]
+    bright, expected = (image.sum(axis=(0, 2), dtype=float) for image in (out, truth(camera)))
+    parts = np.s_[:140], np.s_[150:170], np.s_[180:]
+    ratios = [bright[part].sum() / expected[part].sum() for part in parts]
+    assert ratios == pytest.approx([1.0, 0.9, 0.8], abs=0.03)
+
+
 @pytest.mark.parametrize('attitudes', [RING, BACK_TO_BACK], ids=['ring', 'back to back'])
 @pytest.mark.parametrize('moves', [False, True])
 def test_all_around_there_is_no_end(attitudes, moves):

@@ -53,12 +53,22 @@ class Joint:
 
 
 def distance_px(columns: np.ndarray, seam: Seam, layout: Layout) -> np.ndarray:
-    """Return how far right of the middle of a seam columns of the panorama lie."""
-    distance = columns + 0.5 - (seam.begin + seam.end) / 2
+    """Return how far right of the middle of a seam columns of a panorama of bearings lie.
+
+    Where it does not wrap, columns count by the whole turn that is nearest to its middle: an open
+    panorama may reach past 180 degrees.
+    """
+    surface, seam_px = layout.surface, (seam.begin + seam.end - 1) / 2
     if layout.wraps:
-        around = layout.surface.width
-        distance = (distance + around / 2) % around - around / 2
-    return distance
+        return _nearest_turn(columns - seam_px, surface.width)
+    middle_px = (surface.width - 1) / 2
+    turned = _nearest_turn(columns - middle_px, surface.circumference_px)
+    return turned + middle_px - seam_px
+
+
+def _nearest_turn(distance: np.ndarray, around: float) -> np.ndarray:
+    """Add whole turns to distances so that they are as short as can be, to either side."""
+    return (distance + around / 2) % around - around / 2
 
 
 def ramps(layout: Layout, distances: Sequence[np.ndarray]) -> list[np.ndarray]:
