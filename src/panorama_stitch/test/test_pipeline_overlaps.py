@@ -164,6 +164,44 @@ def test_what_cannot_be_done_is_said(make_line, pictures, tmp_path):
     assert overlap_in_use(line) is before, 'what was in use stays in use'
 
 
+def test_what_cameras_showed_before_one_fell_silent_is_not_measured(
+    make_line, pictures, monkeypatch
+):
+    monkeypatch.setattr(compositor_builder, '_OLDEST_S', 0.6)
+    line = make_line()
+
+    def all_live():
+        return line.published and not line.published[-1][2]
+
+    def feed_for_long(step):
+        end = time.monotonic() + 1.0
+        while time.monotonic() < end:
+            step()
+            time.sleep(0.02)
+
+    def only_left():
+        line.take('left', pictures['left'])
+
+    def far_apart():
+        only_left()
+        line.take('right', pictures['right'], later_ns=10**12)
+
+    for step, wrong in (
+        (only_left, r'^right has given no frame for \d+ s; expected frames of all .* last 0.6 s'),
+        (far_apart, r'^no frames have belonged together for \d+ s; expected frames of all'),
+    ):
+        line.feed(pictures, all_live, 'a panorama')
+        good = overlap_in_use(line)
+        feed_for_long(step)
+        with pytest.raises(OverlapError, match=wrong):
+            line.pipeline.calibrate('', save=False).result(DEADLINE_S)
+        assert overlap_in_use(line) is good
+        line.published.clear()
+        line.stamp_ns += 2 * 10**12
+    line.feed(pictures, all_live, 'a panorama of both again')
+    assert line.pipeline.calibrate('', save=False).result(DEADLINE_S)[0].found
+
+
 def test_what_was_not_found_is_not_saved(make_line, pictures, tmp_path):
     path = tmp_path / 'overlap.yaml'
     line = make_line(replace(SETTINGS, overlap_file=str(path)))

@@ -13,6 +13,7 @@ from fisheye_core.errors import FisheyeError, OverlapError
 from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.overlap.overlap_file import read_overlaps, write_overlaps
 from panorama_stitch.overlap.overlap_result import Overlap
+from panorama_stitch.pipeline.frame_sets import FrameSets
 from panorama_stitch.pipeline.overlap_choice import believed, kept
 from panorama_stitch.pipeline.panorama_settings import PanoramaOutputSettings
 from panorama_stitch.pipeline.recent_frames import RecentFrames, Remembered
@@ -22,6 +23,8 @@ from panorama_stitch.pipeline.seam_watch import SeamWatch
 
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 2.0, 60.0
 """Between two tries to find an overlap."""
+_OLDEST_S = 5.0
+"""Frames that came longer ago, and than it takes to call a camera stale, tell nothing of now."""
 _NOTICES = 20
 
 
@@ -36,11 +39,17 @@ class CompositorBuilder:
         Why there is no newer compositor; '' if nothing is wrong.
     """
 
-    def __init__(self, rig: RigState, watch: SeamWatch):
-        """Start idle; `rig` is what is known of the cameras, `watch` what was seen over time."""
+    def __init__(self, rig: RigState, watch: SeamWatch, frames: FrameSets):
+        """Start idle.
+
+        Parameters
+        ----------
+        rig, watch, frames
+            What is known of the cameras, what was seen over time, and what tells who is silent.
+        """
         self.compositor: Compositor | None = None
         self.trouble = ''
-        self._rig, self._watch = rig, watch
+        self._rig, self._watch, self._frames = rig, watch, frames
         self._background = Background(self._failed)
         self._recent = RecentFrames()
         self._notices: deque[str] = deque(maxlen=_NOTICES)
@@ -99,7 +108,8 @@ class CompositorBuilder:
         -------
         Future
             Of a list of `Overlap`. Where no overlap is found, or none that can be believed, one
-            that was found before stays in use. With a `FisheyeError` nothing has changed.
+            that was found before stays in use. With a `FisheyeError` nothing has changed: an
+            `OverlapError` where what is remembered is too old, say.
         """
         return self._background.do(self._calibrate, settings, method, save)
 
@@ -167,6 +177,8 @@ class CompositorBuilder:
         if save and not settings.overlap_file:
             raise OverlapError('overlap_file is empty; expected the file to save the overlap in')
         remembered, surfaces = self._recent.all(), rig.surfaces
+        if remembered:
+            self._check_age(max(_OLDEST_S, settings.stale_after_s))
         measured = self._measured(remembered, settings, method or settings.method)
         if settings.method != 'paper':
             measured = [
@@ -182,6 +194,20 @@ class CompositorBuilder:
             raise OverlapError('the cameras changed meanwhile; expected them to stay as they are')
         self._use(remembered[-1], settings)
         return measured
+
+    def _check_age(self, limit_s: float) -> None:
+        """Raise an `OverlapError` where what is remembered is older."""
+        age_s = self._recent.age_s
+        if age_s <= limit_s:
+            return
+        silent = ', '.join(
+            f'{camera} has given no frame for {silent_s:.0f} s'
+            for camera, silent_s in self._frames.ages_s().items()
+        )
+        raise OverlapError(
+            (silent or f'no frames have belonged together for {age_s:.0f} s')
+            + f'; expected frames of all cameras from the last {limit_s:g} s'
+        )
 
     def _measured(
         self, remembered: list[Remembered], settings: PanoramaOutputSettings, method: str

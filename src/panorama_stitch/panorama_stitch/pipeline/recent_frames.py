@@ -38,6 +38,11 @@ class RecentFrames:
                 self._kept.append(frames)
         return is_first
 
+    @property
+    def age_s(self) -> float:
+        """How long ago the newest that is kept came, s."""
+        return self._now_s() - self._newest_s
+
     def all(self) -> list[Remembered]:
         """Return what is kept, the oldest first."""
         with self._lock:

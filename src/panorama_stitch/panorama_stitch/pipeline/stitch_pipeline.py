@@ -72,7 +72,7 @@ class StitchPipeline:
         self.broken = 0
         self.economy = Economy()
         self.watch = SeamWatch(self.rig)
-        self._builder = CompositorBuilder(self.rig, self.watch)
+        self._builder = CompositorBuilder(self.rig, self.watch, self.frames)
         self.level = LiveLevel(self.rig)
         self._calibration = CalibrationRequest(self._builder.calibrate)
         self._dimensions = 0
