@@ -153,7 +153,7 @@ class CompositorBuilder:
         if not found and settings.auto_calibrate and remembered:
             surfaces = rig.surfaces
             measured = self._measured(remembered, settings, settings.method)
-            overlaps = kept(measured, rig.overlaps or [])
+            overlaps = kept(measured, rig.overlaps or [], len(rig.cameras), prefers_former=True)
             if not rig.set_overlaps(overlaps, surfaces):
                 self._due_s = 0.0
                 return
@@ -185,7 +185,7 @@ class CompositorBuilder:
                 believed(new, surfaces[index % len(surfaces)], settings.min_confidence)
                 for index, new in enumerate(measured)
             ]
-        overlaps = kept(measured, rig.overlaps or [])
+        overlaps = kept(measured, rig.overlaps or [], len(rig.cameras))
         if save and all(overlap.found for overlap in measured):
             write_overlaps(
                 settings.overlap_file, rig.cameras, surfaces, overlaps, rig.lens_focals_px
