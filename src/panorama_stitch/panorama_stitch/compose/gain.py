@@ -6,6 +6,7 @@ its share of the work.
 """
 
 from collections.abc import Collection, Sequence
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -98,8 +99,8 @@ class GainCompensation:
         ratios = np.stack([pair.log_ratio for pair in self._pairs])
         if self._is_clipped:
             ratios = np.broadcast_to(ratios.mean(axis=1, keepdims=True), ratios.shape)
-        weights = [1.0 if pair.is_known else _UNKNOWN for pair in self._pairs]
-        cameras = [pair.cameras for pair in self._pairs]
+        weights = tuple(1.0 if pair.is_known else _UNKNOWN for pair in self._pairs)
+        cameras = tuple(pair.cameras for pair in self._pairs)
         needed = _solution(cameras, weights, len(self._multipliers)) @ ratios
         return needed - needed[self._reference]
 
@@ -108,7 +109,8 @@ class GainCompensation:
             multiplier.set(factors)
 
 
-def _solution(pairs: Sequence[tuple[int, int]], weights: Sequence[float], cameras: int):
+@lru_cache(maxsize=8)
+def _solution(pairs: tuple[tuple[int, int], ...], weights: tuple[float, ...], cameras: int):
     """Return what takes ratios of pairs to logarithms of factors, (cameras, pairs).
 
     A chain is followed; around a ring, where the ratios contradict each other, the factors are
