@@ -13,7 +13,8 @@ from fisheye_bridge.diagnostics import ERROR, WARN, WARNING_PAUSE_S, Report
 from fisheye_bridge.qos import BEST_EFFORT_INPUT
 from fisheye_bridge.topics import ImageSubscription
 from fisheye_core.errors import CalibrationError, FisheyeError
-from fisheye_geometry.camera import Readout
+from fisheye_core.planar_picture import halvings
+from fisheye_geometry.camera import Camera, Readout
 from fisheye_geometry.image_circle import LensWithImageCircle
 from fisheye_geometry.lens import Lens
 from fisheye_geometry.settling import Settling
@@ -67,7 +68,7 @@ class CameraSubscription:
             picture. None: it is all of it.
         """
         self._node, self._cut = node, cut
-        self._is_padded = transport == 'video'
+        self._is_video = transport == 'video'
         self._on_picture, self._on_lens, self._check = on_picture, on_lens, check
         self._prefix = f'{namespace}/' if namespace else ''
         self._seen: LensWithImageCircle | None = None
@@ -143,7 +144,7 @@ class CameraSubscription:
         if content == self._refused and monotonic() < self._again_s:
             return
         try:
-            lens = lens_of(message)
+            lens = _in_video(lens_of(message)) if self._is_video else lens_of(message)
             self._described = lens.width, lens.height
             if self._picture_size not in (None, (lens.width, lens.height)):
                 whole = f'{size[0]}x{size[1]} px'
@@ -166,9 +167,9 @@ class CameraSubscription:
     def _take_picture(self, image: np.ndarray, encoding: str, header: Header) -> None:
         if self._cut:
             image = self._cut(image)
-        if self._is_padded and self._described:
+        if self._is_video and self._described:
             image = _unpadded(image, *self._described)
-        if self._described or not self._is_padded:
+        if self._described or not self._is_video:
             self._picture_size = image.shape[1::-1]
         seen = self._seen
         if seen and seen.look(image):
@@ -183,6 +184,12 @@ class CameraSubscription:
             self._on_lens(lens, self._header)
         except FisheyeError as error:
             self.refuse(error)
+
+
+def _in_video(lens: Lens) -> Lens:
+    """Return a camera's lens as its video shows it, which is halved where it is too large."""
+    binning = 1 << halvings(lens.width, lens.height)
+    return Readout(binning_x=binning, binning_y=binning).of(Camera('', lens)).lens
 
 
 def _unpadded(image: np.ndarray, width: int, height: int) -> np.ndarray:

@@ -11,9 +11,13 @@ from time import monotonic
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 
+from fisheye_bridge.network import LEASE_S
+
 TOPIC = '/diagnostics'
 DEAF_S = 6.0
 """Within this time several reports of each node are due."""
+GONE_S = LEASE_S + 2.0
+"""One that was killed before its first report can be seen so long."""
 _LOOK_S = 0.5
 _DEPTH = 10
 _ENDLESS_S = 1e6
@@ -43,13 +47,23 @@ class Hearing:
             self._silence = self._looked(now_s)
         return self._silence
 
+    @property
+    def is_well(self) -> bool:
+        """Whether all others that can be seen for some seconds are heard."""
+        now_s = self._now_s()
+        return not self._silence and any(
+            now_s - since > DEAF_S for since in self._since_s.values()
+        )
+
     def _looked(self, now_s: float) -> str:
         others = {bytes(end.endpoint_gid): _name(end) for end in self._others()}
         self._since_s = {gid: self._since_s.get(gid, now_s) for gid in others}
+        hears_any = max(self._heard_s.values(), default=-inf) > now_s - DEAF_S
+        longest_s = GONE_S if hears_any else DEAF_S
         silent = {
             others[gid]
             for gid, since_s in self._since_s.items()
-            if now_s - since_s > DEAF_S and self._heard_at_s(others[gid]) < since_s
+            if now_s - since_s > longest_s and self._heard_at_s(others[gid]) < since_s
         }
         names = ', '.join(sorted(name.lstrip('/') for name in silent))
         return f'{names} can be seen, but nothing comes from there' if names else ''

@@ -20,6 +20,8 @@ from rclpy.node import Node
 
 from fisheye_bridge.shared_memory import is_fast_dds
 
+LEASE_S = 20.0
+"""So long Fast DDS takes a process that says nothing for alive, and an address for its own."""
 _LOOK_S = 0.2
 _GET_FLAGS, _GET_ADDRESS = 0x8913, 0x8915
 """ioctls of netdevice(7)."""
@@ -47,7 +49,10 @@ def addresses() -> set[str]:
 def is_local_only() -> bool:
     """Return whether the environment keeps discovery on this machine."""
     reach = os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE', '').upper()
-    return reach in ('LOCALHOST', 'OFF') or os.environ.get('ROS_LOCALHOST_ONLY') == '1'
+    if reach == 'OFF' or os.environ.get('ROS_LOCALHOST_ONLY') == '1':
+        return True
+    # Static peers are reached all the same.
+    return reach == 'LOCALHOST' and not os.environ.get('ROS_STATIC_PEERS')
 
 
 class Links:
@@ -65,7 +70,7 @@ class Links:
         self, look: Callable[[], set[str]] = addresses, now_s: Callable[[], float] = monotonic
     ):
         self._look, self._now_s = look, now_s
-        self._known = look()
+        self._seen_s = dict.fromkeys(look(), now_s())
         self._due_s = now_s() + _LOOK_S
         self._is_off = is_local_only()
 
@@ -86,13 +91,17 @@ class Links:
         if self._is_off or now_s < self._due_s:
             return ''
         self._due_s = now_s + _LOOK_S
-        found = self._look()
-        added, gone = found - self._known, self._known - found
+        found, known = self._look(), set(self._seen_s)
+        added, gone = found - known, known - found
         # One that only went may come back, as where a cable is pulled and plugged in again.
-        if added and (not tell() or gone or not self._known):
+        if added and (not tell() or gone or not known):
             former = f' in place of {_listed(gone)}' if gone else ''
             return f'this machine is now reached at {_listed(added)}{former}'
-        self._known |= added
+        if found & known:
+            for address in gone:
+                if now_s - self._seen_s[address] > LEASE_S:
+                    del self._seen_s[address]
+        self._seen_s.update(dict.fromkeys(found, now_s))
         return ''
 
 

@@ -20,6 +20,7 @@ from fisheye_bridge.hearing import hearing_of
 from fisheye_bridge.network import Links, forget_machine, refresher
 from fisheye_bridge.parameters import misspelt
 from fisheye_bridge.watchdog import Watchdog
+from fisheye_core import quiet_jpeg
 from fisheye_core.errors import FisheyeError
 
 _SWITCH_S = 0.0005
@@ -119,6 +120,8 @@ class _Process:
                 if reason:
                     node.get_logger().warning(f'{reason}: connecting anew')
                     break
+                if self._tries and hearing.is_well:
+                    self._tries = 0
         finally:
             self._watchdog.ending()
             if executor:
@@ -179,6 +182,7 @@ def begin(node_class: type[Node]) -> None:
 
 def _give_up(arguments) -> None:
     """End the process when one of its threads dies of a bug: a frozen picture would look alive."""
+    quiet_jpeg.stop()  # what is said now would be lost
     text = ''.join(traceback.format_exception(arguments.exc_value))
     get_logger('fisheye').fatal(f'the thread {arguments.thread.name} died:\n{text}')
     os._exit(1)

@@ -6,6 +6,7 @@ from sensor_msgs.msg import CompressedImage
 from std_msgs.msg import Empty
 
 from fisheye_bridge.qos import VIDEO
+from fisheye_bridge.stamps import ns_of
 from fisheye_core.errors import ImageFormatError
 from fisheye_core.video import video_decoder
 
@@ -33,7 +34,9 @@ class VideoInput:
             If it is broken, or drawn upon one that is.
         """
         damaged = self._decoder.damaged
-        image = self._decoder.decode(bytes(message.data))
+        # Pictures that waited for their turn are none that are missing.
+        taken_s = ns_of(message.header.stamp) * 1e-9
+        image = self._decoder.decode(bytes(message.data), now_s=taken_s)
         if self._decoder.wants_keyframe:
             self._requests.publish(Empty())
         if self._decoder.damaged > damaged and image is None:

@@ -55,7 +55,7 @@ class VideoPublisher:
             for kind, kind_class in message_types()
         ]
         node.create_subscription(Empty, f'{video}/keyframe', self._take_request, VIDEO)
-        self._worker = LatestOnlyWorker(self._publish, 'video')
+        self._worker = LatestOnlyWorker(self._publish, 'video', on_error=self._failed)
 
     @property
     def wanted(self) -> bool:
@@ -107,11 +107,7 @@ class VideoPublisher:
 
     def _publish(self, picture: VideoPicture) -> None:
         begin_s = monotonic()
-        try:
-            encoded = self._encoded(picture)
-        except FisheyeError as error:
-            self._tell(str(error))
-            return
+        encoded = self._encoded(picture)
         self._encoding_ms = 1e3 * (monotonic() - begin_s)
         self._rate.count()
         self._bytes += len(encoded.data)
@@ -140,6 +136,10 @@ class VideoPublisher:
             self._due_s.popleft()
             is_due = True
         return is_due
+
+    def _failed(self, error: FisheyeError) -> None:
+        self._encoder = None
+        self._tell(str(error))
 
     def _tell(self, fault: str) -> None:
         if fault and fault != self._fault:

@@ -7,7 +7,7 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.executors import SingleThreadedExecutor
 
-from fisheye_bridge.hearing import DEAF_S, TOPIC, Hearing
+from fisheye_bridge.hearing import DEAF_S, GONE_S, TOPIC, Hearing
 from fisheye_bridge.qos import HEARTBEAT
 
 WAIT_S, LATER_S = 20.0, 1.0
@@ -20,7 +20,8 @@ class NodePair:
         self.now_s = 0.0
         self.listener, self.other = rclpy.create_node('listener'), rclpy.create_node('other')
         self.publisher = self.other.create_publisher(DiagnosticArray, TOPIC, qos)
-        self.hearing = Hearing(self.listener, lambda: self.now_s)
+        self.hearing, self.messages = Hearing(self.listener, lambda: self.now_s), []
+        self.listener.create_subscription(DiagnosticArray, TOPIC, self.messages.append, 10)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self.listener)
 
@@ -34,6 +35,13 @@ class NodePair:
     def say(self, name):
         status = DiagnosticStatus(name=name, hardware_id=f'/{name}')
         self.publisher.publish(DiagnosticArray(status=[status]))
+
+    def hear(self, name):
+        """Say something, and wait until whoever listens took it."""
+        self.messages.clear()
+        self.say(name)
+        self.spin_until(lambda: self.messages)
+        self._executor.spin_once(timeout_sec=0.05)
 
     def is_seen(self):
         return self.listener.count_publishers(TOPIC)
@@ -79,8 +87,16 @@ def test_one_that_is_not_heard_beside_others_is_named(pair):
     third.create_publisher(DiagnosticArray, TOPIC, HEARTBEAT)
     pair.spin_until(lambda: pair.is_seen() == 2)
     hear_other(pair)
-    assert pair.silence_after(2 * DEAF_S) == 'third can be seen, but nothing comes from there'
+    while not (silence := pair.silence_after(LATER_S)):
+        pair.hear('other')
+    assert silence == 'third can be seen, but nothing comes from there'
+    assert pair.now_s > GONE_S, 'it may have been killed before its first report'
+    assert not pair.hearing.is_well
     third.destroy_node()
+    pair.spin_until(lambda: pair.is_seen() == 1)
+    pair.hear('other')
+    assert not pair.silence_after(LATER_S)
+    assert pair.hearing.is_well
 
 
 def test_one_that_was_started_again_is_to_be_heard_again(pair):

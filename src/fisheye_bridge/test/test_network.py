@@ -33,7 +33,8 @@ class Machine:
 @pytest.fixture(autouse=True)
 def reach(monkeypatch):
     monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'SUBNET')
-    monkeypatch.delenv('ROS_LOCALHOST_ONLY', raising=False)
+    for name in ('ROS_LOCALHOST_ONLY', 'ROS_STATIC_PEERS'):
+        monkeypatch.delenv(name, raising=False)
 
 
 @pytest.mark.parametrize(
@@ -47,6 +48,8 @@ def reach(monkeypatch):
         ([set(), {LTE}], ANEW),
         ([{WIFI, LTE}, {LTE}], NOTHING),
         ([{WIFI, LTE}, {LTE}, {WIFI, LTE}], NOTHING),
+        ([{WIFI, LTE}, *[{LTE}] * 30, {LTE, OTHER_WIFI}], TOLD),
+        ([{WIFI, LTE}, *[set()] * 30, {OTHER_WIFI}], ANEW),
     ],
 )
 def test_of_what_changes_the_others_learn(seen, expected):
@@ -69,6 +72,12 @@ def test_a_middleware_that_cannot_be_told_is_started_anew():
 def test_a_node_that_stays_on_its_machine_does_not_care(monkeypatch, reach):
     monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', reach)
     assert Machine(WIFI).see(LTE) == NOTHING
+
+
+def test_static_peers_are_on_other_machines(monkeypatch):
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    monkeypatch.setenv('ROS_STATIC_PEERS', '10.0.0.9')
+    assert Machine(WIFI).see(LTE) == ANEW
 
 
 def test_it_is_looked_at_now_and_then_only():

@@ -1,7 +1,9 @@
 """Video between two nodes: only while it is wanted, from the first moment on, and mended."""
 
+import time
 from array import array
 from threading import Event
+from unittest.mock import Mock
 
 import cv2
 import numpy as np
@@ -13,11 +15,13 @@ from std_msgs.msg import Header
 
 from fisheye_bridge import video_publisher
 from fisheye_bridge.camera_topics import CameraSubscription
-from fisheye_bridge.diagnostics import WARN, Report
+from fisheye_bridge.diagnostics import OK, WARN, Report
 from fisheye_bridge.qos import IMAGE, VIDEO, VIDEO_INPUT
 from fisheye_bridge.stamps import ns_of, stamp_of
 from fisheye_bridge.topics import ImageSubscription
+from fisheye_bridge.video_input import VideoInput
 from fisheye_bridge.video_publisher import VideoPublisher
+from fisheye_core import planar_picture
 from fisheye_core.errors import VideoError
 from fisheye_core.h264_encoder import H264Encoder
 from fisheye_core.nal_units import is_keyframe
@@ -200,6 +204,28 @@ def test_a_fault_of_the_encoder_is_told_and_harms_nothing_else(link, monkeypatch
     assert link.report().values['video encoder'] == 'none'
 
 
+def test_a_bug_of_the_encoder_is_told_and_harms_nothing_else(link, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr(H264Encoder, 'encode', Mock(side_effect=ValueError('no such thing')))
+        link.subscribe(lambda message: None)
+        link.until(lambda: link.report().level == WARN, 'a warning')
+        (reason,) = link.report().reasons
+        assert 'a bug, ValueError: no such thing' in reason
+    link.until(lambda: link.report().level == OK, 'video')
+
+
+def test_pictures_that_waited_for_their_turn_are_shown(link):
+    encoder, stamps_ns = H264Encoder(bitrate_kbps=2000, keyframe_s=60.0, encoder='libx264'), []
+    video = VideoInput(link.base, 'image_raw/video')
+    for number in range(60):
+        stamps_ns.append(number * 33_000_000)
+        encoded = encoder.encode(np.full((120, 160, 3), 4 * number, np.uint8), now_s=number / 30)
+        header = Header(stamp=stamp_of(stamps_ns[-1]))
+        if number == 40:
+            time.sleep(0.2)  # ten times what those before took, which came at once
+        assert video(CompressedImage(header=header, data=encoded.data)), number
+
+
 def test_grey_pictures_are_video_too(link):
     pictures = []
     ImageSubscription(
@@ -215,8 +241,13 @@ def test_grey_pictures_are_video_too(link):
     wait_for(step, what='a grey picture')
 
 
-def test_pictures_of_odd_sides_come_as_their_camera_info_describes_them(link):
+@pytest.mark.parametrize('is_too_large', [False, True])
+def test_pictures_come_as_their_camera_info_describes_them(link, monkeypatch, is_too_large):
     width, height, pictures, lenses = 161, 119, [], []
+    shown = width, height
+    if is_too_large:
+        monkeypatch.setattr(planar_picture, 'MAX_MACROBLOCKS', 40)
+        shown = 80, 59
     CameraSubscription(
         link.base,
         on_picture=lambda image, *_: pictures.append(image.shape[1::-1]),
@@ -232,9 +263,10 @@ def test_pictures_of_odd_sides_come_as_their_camera_info_describes_them(link):
     def step():
         infos.publish(info)
         link.step(image)
-        return lenses and pictures[-5:] == [(width, height)] * 5
+        return lenses and pictures[-5:] == [shown] * 5
 
     wait_for(step, what='pictures of the size of the camera')
+    assert (lenses[-1].width, lenses[-1].height) == shown
 
 
 def test_a_thousand_fuzzed_messages_are_survived_told_and_mended(link):

@@ -14,12 +14,15 @@ import signal
 from rclpy.node import Node
 from fisheye_bridge import watchdog
 from fisheye_bridge.running import run
+from fisheye_core.quiet_jpeg import without_libjpeg_lines
 
 watchdog.HANGS_S, watchdog.ENDS_S, watchdog._REARM_S = 1.0, 0.5, 0.1
 
-WHERE = '{where}'
+WHERE, DECODES = '{where}', {decodes}
 
 def hang():
+    if DECODES:
+        without_libjpeg_lines().__enter__()
     print('hangs', flush=True)
     ctypes.PyDLL(None).sleep(1000)
 
@@ -41,11 +44,14 @@ run(Hanging)
 """
 
 
-@pytest.mark.parametrize('where', ['tick', 'destroy_node'])
-def test_a_node_that_hangs_ends_and_says_where(where):
+@pytest.mark.parametrize(
+    ('where', 'decodes'), [('tick', False), ('tick', True), ('destroy_node', False)]
+)
+def test_a_node_that_hangs_ends_and_says_where(where, decodes):
     """It is not ended before: its 150 ticks of 10 ms take longer than the watchdog waits."""
+    program = PROGRAM.replace('{where}', where).replace('{decodes}', str(decodes))
     process = subprocess.run(
-        [sys.executable, '-c', PROGRAM.replace('{where}', where)],
+        [sys.executable, '-c', program],
         capture_output=True,
         text=True,
         timeout=PATIENCE_S,

@@ -50,7 +50,7 @@ class H264Decoder:
         encoding
             Of the result, one of `fisheye_core.encodings.CHANNELS`.
         now_s
-            When it came, on a steady clock; None: now.
+            When it was taken or came; None: now.
 
         Returns
         -------
@@ -82,7 +82,8 @@ class H264Decoder:
         passed_s, self._came_s = now_s - self._came_s, now_s
         is_after_pause = passed_s > _MANY_PERIODS * self._period_s
         if isfinite(passed_s):
-            self._period_s += _NEWEST * (min(passed_s, _LONGEST_PERIOD_S) - self._period_s)
+            period_s = min(max(passed_s, 0.0), _LONGEST_PERIOD_S)
+            self._period_s += _NEWEST * (period_s - self._period_s)
         return is_after_pause
 
 

@@ -27,10 +27,10 @@ def to_planes(image: np.ndarray, encoding: str) -> np.ndarray:
     """
     if not image.size:
         raise ImageFormatError(f'a picture of {image.shape[1]}x{image.shape[0]} px is empty')
-    while _is_too_large(image):
-        half = tuple(max(1, side // 2) for side in image.shape[1::-1])
-        image = cv2.resize(image, half, interpolation=cv2.INTER_AREA)
     height, width = image.shape[:2]
+    if count := halvings(width, height):
+        height, width = (max(1, side >> count) for side in (height, width))
+        image = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
     if height % 2 or width % 2:
         image = cv2.copyMakeBorder(image, 0, height % 2, 0, width % 2, cv2.BORDER_REPLICATE)
     if encoding in _CONVERSIONS:
@@ -41,6 +41,14 @@ def to_planes(image: np.ndarray, encoding: str) -> np.ndarray:
     return np.vstack([luminance, colour])
 
 
-def _is_too_large(image: np.ndarray) -> bool:
-    rows, columns = (-(-side // _MACROBLOCK_PX) for side in image.shape[:2])
-    return rows * columns > MAX_MACROBLOCKS or max(image.shape[:2]) > MAX_SIDE_PX
+def halvings(width: int, height: int) -> int:
+    """Return how often a picture of so many px is halved until level 5.1 takes it."""
+    count = 0
+    while _is_too_large(width >> count, height >> count):
+        count += 1
+    return count
+
+
+def _is_too_large(width: int, height: int) -> bool:
+    columns, rows = (-(-side // _MACROBLOCK_PX) for side in (width, height))
+    return rows * columns > MAX_MACROBLOCKS or max(width, height) > MAX_SIDE_PX

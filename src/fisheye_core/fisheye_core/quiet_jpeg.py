@@ -29,11 +29,14 @@ class _StderrFilter:
     def __init__(self) -> None:
         self._lock = Lock()
         self._decoding = 0
+        self._is_over = False
         self._held = self._stderr = -1
         self._passed = 0
 
     def enter(self) -> None:
         with self._lock:
+            if self._is_over:
+                raise OSError('standard error is not held back any more')
             if not self._decoding:
                 if self._held < 0:
                     self._held = os.memfd_create('stderr', os.MFD_CLOEXEC)
@@ -41,6 +44,12 @@ class _StderrFilter:
                 self._stderr = os.dup(_STDERR)
                 os.dup2(self._held, _STDERR)
             self._decoding += 1
+
+    def stop(self) -> None:
+        with self._lock:
+            self._is_over = True
+            if self._decoding:
+                os.dup2(self._stderr, _STDERR)
 
     def leave(self) -> None:
         with self._lock:
@@ -68,12 +77,17 @@ class _StderrFilter:
 _stderr_filter = _StderrFilter()
 
 
+def stop() -> None:
+    """Hold nothing back from now on: what a process says at its end must not be lost."""
+    _stderr_filter.stop()
+
+
 @contextmanager
 def without_libjpeg_lines() -> Iterator[None]:
     """Keep what libjpeg says from standard error; what others say meanwhile comes behind."""
     try:
         _stderr_filter.enter()
-    except OSError:  # There is no standard error, or no more files may be opened.
+    except OSError:  # There is no standard error, no more files may be opened, or it is the end.
         yield
         return
     try:

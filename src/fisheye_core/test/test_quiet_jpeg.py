@@ -1,6 +1,8 @@
 """libjpeg's lines: kept from the log, and nobody else's."""
 
 import os
+import subprocess
+import sys
 from threading import Barrier, Thread
 
 import cv2
@@ -31,6 +33,20 @@ def test_what_others_say_meanwhile_comes_whole_and_in_order(capfd):
         os.write(2, b'second\n')
     os.write(2, b'third\n')
     assert capfd.readouterr().err == 'first\nsecond\nthird\n'
+
+
+def test_last_words_are_not_lost():
+    program = (
+        'import os\n'
+        'from fisheye_core import quiet_jpeg\n'
+        'with quiet_jpeg.without_libjpeg_lines():\n'
+        '    quiet_jpeg.stop()\n'
+        '    with quiet_jpeg.without_libjpeg_lines():\n'
+        '        os.write(2, b"last words")\n'
+        '        os._exit(1)\n'
+    )
+    process = subprocess.run([sys.executable, '-c', program], capture_output=True, check=False)
+    assert process.stderr == b'last words'
 
 
 def test_threads_that_decode_at_once_leave_standard_error_as_it_was(capfd):
