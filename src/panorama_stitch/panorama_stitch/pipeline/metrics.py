@@ -72,7 +72,7 @@ def economy_sentence(pipeline: StitchPipeline) -> str:
 
 
 def lag_sentence(pipeline: StitchPipeline) -> str:
-    """Tell that the panorama waits long for one camera; '' where it does not."""
+    """Return that the panorama waits long for one camera; '' where it does not."""
     pairing = pipeline.frames.pairing
     if pipeline.settings.pair_by == 'arrival' or pairing.lag_ns < _LONG_LAG_NS:
         return ''
