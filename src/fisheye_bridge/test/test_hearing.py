@@ -37,7 +37,7 @@ class NodePair:
         self.publisher.publish(DiagnosticArray(status=[status]))
 
     def hear(self, name):
-        """Say something, and wait until whoever listens took it."""
+        """Publish a report of a node, and wait until it was taken."""
         self.messages.clear()
         self.say(name)
         self.spin_until(lambda: self.messages)
