@@ -41,12 +41,16 @@ def test_who_asks_again_meanwhile_gets_the_same_measurement(make_line, pictures)
 def test_an_answer_without_overlap_never_replaces_a_good_one(make_line, pictures):
     line = make_line()
     line.feed(pictures, lambda: line.published, 'a panorama')
-    good = overlap_in_use(line)
     dark = {camera: np.zeros_like(picture) for camera, picture in pictures.items()}
-    end = time.monotonic() + 1.5
-    line.feed(dark, lambda: time.monotonic() > end, 'time to forget the bright pictures')
-    assert not line.pipeline.calibrate('', save=False).result(DEADLINE_S)[0].found
-    assert overlap_in_use(line) == good
+    good = []
+
+    def is_lost():
+        good.append(overlap_in_use(line))
+        return not line.pipeline.calibrate('', save=False).result(DEADLINE_S)[0].found
+
+    line.feed(dark, is_lost, 'an answer without overlap, once the bright pictures are forgotten')
+    assert overlap_in_use(line) == good[-1]
+    assert good[-1].found
 
 
 def test_what_was_found_before_stays_while_the_rest_is_sought(make_line, monkeypatch):
