@@ -36,8 +36,8 @@ LENS = make_lens(
 ).with_max_angle(np.radians(92))
 SEAM_DEG = 2.0
 """Rows of a panorama whose middle is not quite level; seams begin and end in whole columns."""
-SMALL_OBJECTS_BYTES = 20_000
-"""Slices and the like, a fiftieth of a small panorama; they are freed at once."""
+SMALL_OBJECTS_BYTES = 40_000
+"""Slices and the like, a twenty-fifth of a small panorama; they are freed at once."""
 SURFACE = surface_for(LENS)
 OFFSET = YAW * SURFACE.focal_px
 

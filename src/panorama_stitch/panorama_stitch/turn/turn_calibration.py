@@ -78,9 +78,9 @@ def calibrate_turn(
         nothing that fits a turn.
     """
     frames = tracker.frames
+    starts = _starts(tracker, cameras, turns_right)
     brightest = tuple(np.max(pictures, axis=0) for pictures in zip(*frames, strict=True))
     sizes = {name: picture.shape[::-1] for name, picture in zip(cameras, brightest, strict=True)}
-    starts = _starts(tracker, cameras, turns_right)
     fits = [adjust(state, seen, sizes, yaws_known=False) for state, seen in starts]
     fit = min(fits, key=lambda fit: fit.noise_px / len(fit.seen))
     state, seen, found_share = _with_yaws(fit.state, frames, brightest), fit.seen, 0.0
