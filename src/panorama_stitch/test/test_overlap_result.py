@@ -10,11 +10,11 @@ from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.attitude import LEVEL, Attitude
 from fisheye_geometry.lens_surface import surface_for
 from fisheye_geometry.surface import SURFACES
+from panorama_stitch.overlap.overlap_by_hand import overlap_by_hand
 from panorama_stitch.overlap.overlap_result import (
     Overlap,
     attitude_at,
     common_px,
-    overlap_by_hand,
     with_offset,
     yaw_between_rad,
 )

@@ -1,7 +1,7 @@
 """What overlap calibration finds out about two neighbouring cameras."""
 
 from dataclasses import dataclass, replace
-from math import degrees, isnan, nan, radians
+from math import degrees, nan, radians
 
 import numpy as np
 
@@ -162,7 +162,7 @@ def with_offset(
     if overlap.attitude is None:
         return overlap
     yaw_rad = bearing_rad(*attitudes)
-    x_px, y_px = _offset_px(left, right, attitudes)
+    x_px, y_px = offset_px(left, right, attitudes)
     message = overlap.message
     if abs(yaw_rad - overlap.attitude.yaw_rad) > _SHOWN_RAD:
         message += f'; {degrees(yaw_rad):.2f} degrees about the level vertical'
@@ -205,82 +205,21 @@ def on_surfaces(
     )
 
 
-def _offset_px(
+def offset_px(
     left: Surface, right: Surface, attitudes: tuple[Attitude, Attitude]
 ) -> tuple[float, float]:
-    """Return the offset (x, y) that the level attitudes of both cameras mean."""
+    """Return the offset (x, y) that the level attitudes of both cameras mean.
+
+    Parameters
+    ----------
+    left, right
+        What the corrected images of both are on.
+    attitudes
+        Of the left and of the right camera.
+    """
     x_px = bearing_rad(*attitudes) * left.focal_px + left.center_x_px - right.center_x_px
     horizons_px = [
         surface.row_px(attitude.pitch_rad)
         for surface, attitude in zip((left, right), attitudes, strict=True)
     ]
     return x_px, horizons_px[0] - horizons_px[1]
-
-
-def overlap_by_hand(
-    measured: Overlap,
-    x_px: float,
-    y_px: float,
-    left: Surface,
-    right: Surface,
-    attitudes: tuple[Attitude, Attitude],
-) -> Overlap:
-    """Return an overlap with an offset that a person set.
-
-    Parameters
-    ----------
-    measured
-        What there is without.
-    x_px, y_px
-        The offset; NaN leaves a part as it was measured.
-    left, right
-        What the corrected images of both are on.
-    attitudes
-        Level ones of both cameras; where no attitude was measured, what is set turns the right
-        one from there.
-    """
-    if isnan(x_px) and isnan(y_px):
-        return measured
-    found = measured.found or not (isnan(x_px) or x_px == measured.offset_x_px)
-    former_px = measured.offset_x_px, measured.offset_y_px
-    is_turn = found and left.yaw_is_column_shift
-    if is_turn and measured.attitude:
-        # Only the left one is taken as it is drawn: a ring spreads what its rotations miss.
-        turned = attitudes[0].matrix @ measured.attitude.matrix
-        attitudes = attitudes[0], Attitude.of(turned)
-    elif is_turn:
-        former_px = _offset_px(left, right, attitudes)
-    x_px, y_px = (
-        former if isnan(value) else value
-        for former, value in zip(former_px, (x_px, y_px), strict=True)
-    )
-    attitude = None
-    if is_turn:
-        by_px = x_px - former_px[0], y_px - former_px[1]
-        attitude = _moved(attitudes, by_px, right)
-    return replace(
-        measured,
-        method='manual',
-        found=found,
-        offset_x_px=x_px,
-        offset_y_px=y_px,
-        attitude=attitude,
-        overlap_px=common_px(x_px, left, right),
-        message='set by hand',
-    )
-
-
-def _moved(
-    attitudes: tuple[Attitude, Attitude], by_px: tuple[float, float], surface: Surface
-) -> Attitude:
-    """Move the image of the right one of two level attitudes; return it in the left one's frame.
-
-    As the offset does, it turns about the level vertical, and its horizon is moved.
-    """
-    left, right = attitudes
-    moved = Attitude(
-        right.yaw_rad + by_px[0] / surface.focal_px,
-        surface.depression_rad(surface.row_px(right.pitch_rad) - by_px[1]),
-        right.roll_rad,
-    )
-    return Attitude.of(left.matrix.T @ moved.matrix)

@@ -12,10 +12,10 @@ from panorama_stitch.compose.compositor import Compositor
 from panorama_stitch.compose.placing import leads_around
 from panorama_stitch.compose.posing import views_at_overlaps, views_of_rig
 from panorama_stitch.compose.view import View
+from panorama_stitch.overlap.overlap_by_hand import overlap_by_hand
 from panorama_stitch.overlap.overlap_result import (
     Overlap,
     on_surfaces,
-    overlap_by_hand,
     side_by_side,
 )
 from panorama_stitch.pipeline.known_cameras import CameraPlace, Images, surfaces_of
