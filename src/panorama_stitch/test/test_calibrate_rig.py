@@ -22,11 +22,14 @@ from panorama_stitch.turn import record_node
 from panorama_stitch.turn.calibrate_rig import GOOD, main
 from panorama_stitch.turn.record_node import record
 from panorama_stitch.turn.tracker import TurnTracker
+from panorama_stitch.turn.turn_calibration import calibrate_turn
 
 STEP_DEG, TURNED_DEG = 7.0, 378.0
 AROUND = 51
 """Pictures of one turn."""
 FOCAL, ANGLE_DEG, MOUNT_DEG = 0.005, 0.3, 0.3
+BEYOND_LEFT_DEG = 40.0
+"""Above and below what the left camera sees in the middle of its picture."""
 PERIOD_NS = 100_000_000
 NAMES = tuple(MOUNTS_DEG)
 
@@ -86,6 +89,16 @@ def test_from_folders_of_pictures_to_the_files_of_a_panorama(recorded, tmp_path,
         assert nodes[f'/**/{name}/capture']['ros__parameters']['camera_info_url'] == url
     # What it wrote it may replace.
     assert 'nowhere is not there' in refused(capsys, 'left=nowhere', '-o', tmp_path)
+
+
+def test_what_only_the_second_camera_sees_counts_too(pictures):
+    tracker = TurnTracker(NAMES)
+    for left, right in pictures:
+        tracker.add((left[60:180, 60:260], right))
+    state = calibrate_turn(tracker, NAMES).fit.state
+    above_deg = np.degrees(np.arcsin(state.directions[:, 1]))
+    assert np.count_nonzero(np.abs(above_deg) > BEYOND_LEFT_DEG) > 80
+    assert np.abs(state.lenses[:, 0] / turning_lens().focal_x_px - 1).max() < FOCAL
 
 
 def test_topics_are_watched_until_the_rig_has_come_round(pictures):

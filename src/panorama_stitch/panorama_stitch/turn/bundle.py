@@ -23,7 +23,10 @@ _LIMIT = 2.0
 """Deviations beyond which a residual counts linearly, and for the last time, ..."""
 _OUTLIER = 6.0
 """... and those from which it does not count at all."""
-_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-8, 1e6
+_FIRST_DAMPING, _DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-5, 1e-8, 1e6
+"""Of a first estimate, which had better stay near where it begins than follow a valley in which
+nothing but noise tells cameras apart; and of others, where a step that only the damping keeps
+short would be taken for the last one."""
 _LEAST_NOISE_PX = 0.02
 _LEAST_SIGHTINGS = 2
 
@@ -136,6 +139,7 @@ class _TurnProblem:
         first: bool,
     ):
         self._seen, self._free, self._noise = seen, free, noise_px
+        self._damping = _FIRST_DAMPING if first else _DAMPING
         self._expected = partial(expected, sizes=list(sizes.values()), first=first)
 
     def solve(self, state: TurnState) -> tuple[TurnState, float]:
@@ -144,7 +148,7 @@ class _TurnProblem:
         Levenberg and Marquardt's method. Each step is exact, for landmarks are eliminated: they
         are many, but none has anything to do with another.
         """
-        damping, residuals = _DAMPING, self._residuals(state)
+        damping, residuals = self._damping, self._residuals(state)
         cost = _cost(residuals)
         for _ in range(_STEPS):
             information, gradient = self._normal_equations(state, residuals)

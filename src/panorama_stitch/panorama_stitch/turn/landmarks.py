@@ -9,18 +9,19 @@ from panorama_stitch.turn.turn_state import TurnState
 
 _ACROSS_DEG, _UP_DEG = 12, 15
 _IN_CELL = 3
-"""Landmarks of a camera in each cell of directions: all around counts, not where there is most."""
+"""Landmarks in each cell of directions: all around counts, not where there is most."""
 _LEAST_SIGHTINGS = 5
 
 
-def spread(state: TurnState, seen: Sightings) -> tuple[TurnState, Sightings]:
+def spread(state: TurnState, seen: Sightings, *, yaws_known: bool) -> tuple[TurnState, Sightings]:
     """Keep the landmarks that were seen longest, few in any direction.
 
-    Those that link two frames only, across the end of the turn, stay too.
+    Those that link two frames only, across the end of the turn, stay too. Until the yaws of the
+    cameras are known, each camera has directions of its own.
     """
     counts = np.bincount(seen.landmark, minlength=len(state.directions))
     camera = np.zeros(len(counts), int)
-    camera[seen.landmark] = seen.camera
+    camera[seen.landmark] = 0 if yaws_known else seen.camera
     first, newest = (_extreme(seen, len(counts), of) for of in (np.minimum, np.maximum))
     is_link = newest - first > counts
     x, y, z = state.directions.T

@@ -83,7 +83,8 @@ def calibrate_turn(
     sizes = {name: picture.shape[::-1] for name, picture in zip(cameras, brightest, strict=True)}
     fits = [adjust(state, seen, sizes, yaws_known=False) for state, seen in starts]
     fit = min(fits, key=lambda fit: fit.noise_px / len(fit.seen))
-    state, seen, found_share = _with_yaws(fit.state, frames, brightest), fit.seen, 0.0
+    state, seen = spread(_with_yaws(fit, frames, brightest), fit.seen, yaws_known=True)
+    found_share = 0.0
     for reach_px, least, share, sheared in _LOOKS:
         reference = clearest(state, seen)
         views = LevelViews(frames, state, brightest)
@@ -119,7 +120,10 @@ def _starts(
             links += [(camera, late, ids, before), (camera, early, ids, after)]
             number += len(ids)
     seen = followed.and_(joined(links))
-    return [spread(first_state(firsts, seen, turns_right, share), seen) for share in _SHARES]
+    return [
+        spread(first_state(firsts, seen, turns_right, share), seen, yaws_known=False)
+        for share in _SHARES
+    ]
 
 
 def _steps(seen: Sightings, frames: int) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -133,16 +137,20 @@ def _steps(seen: Sightings, frames: int) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 def _with_yaws(
-    state: TurnState, frames: Sequence[Frame], brightest: Sequence[np.ndarray]
+    fit: TurnFit, frames: Sequence[Frame], brightest: Sequence[np.ndarray]
 ) -> TurnState:
-    """Turn the cameras against each other as their panoramas say."""
+    """Turn the cameras, each with its own landmarks, against each other as their panoramas say."""
+    state = fit.state
     views = LevelViews(frames, state, brightest)
     first = views.panorama(0)
     yaws = [0.0]
     yaws += [yaw_between(first, views.panorama(i)) for i in range(1, len(brightest))]
     turns = np.array([Attitude(yaw_rad=yaw).matrix for yaw in yaws])
+    own = np.zeros(len(state.directions), int)
+    own[fit.seen.landmark] = fit.seen.camera
     return replace(
         state,
         attitudes=turns @ state.attitudes,
         places=np.einsum('cij,cj->ci', turns, state.places),
+        directions=np.einsum('lij,lj->li', turns[own], state.directions),
     )
