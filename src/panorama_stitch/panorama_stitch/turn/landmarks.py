@@ -13,6 +13,13 @@ _IN_CELL = 3
 _LEAST_SIGHTINGS = 5
 
 
+def own_camera(seen: Sightings, count: int) -> np.ndarray:
+    """Return which camera saw each landmark, (count,) int, while none saw another's."""
+    camera = np.zeros(count, int)
+    camera[seen.landmark] = seen.camera
+    return camera
+
+
 def spread(state: TurnState, seen: Sightings, *, yaws_known: bool) -> tuple[TurnState, Sightings]:
     """Keep the landmarks that were seen longest, few in any direction.
 
@@ -20,8 +27,7 @@ def spread(state: TurnState, seen: Sightings, *, yaws_known: bool) -> tuple[Turn
     cameras are known, each camera has directions of its own.
     """
     counts = np.bincount(seen.landmark, minlength=len(state.directions))
-    camera = np.zeros(len(counts), int)
-    camera[seen.landmark] = 0 if yaws_known else seen.camera
+    camera = np.zeros(len(counts), int) if yaws_known else own_camera(seen, len(counts))
     first, newest = (_extreme(seen, len(counts), of) for of in (np.minimum, np.maximum))
     is_link = newest - first > counts
     x, y, z = state.directions.T

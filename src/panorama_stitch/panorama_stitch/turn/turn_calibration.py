@@ -12,7 +12,7 @@ from panorama_stitch.turn.bundle import TurnFit, adjust
 from panorama_stitch.turn.first_turn import first_camera, first_state
 from panorama_stitch.turn.full_circle import Frame, closing_frame, seen_again
 from panorama_stitch.turn.halves import TurnHalves, halves_of
-from panorama_stitch.turn.landmarks import clearest, everywhere, spread
+from panorama_stitch.turn.landmarks import clearest, everywhere, own_camera, spread
 from panorama_stitch.turn.level_views import LevelViews
 from panorama_stitch.turn.panorama_yaw import yaw_between
 from panorama_stitch.turn.sightings import Sightings, joined
@@ -146,8 +146,7 @@ def _with_yaws(
     yaws = [0.0]
     yaws += [yaw_between(first, views.panorama(i)) for i in range(1, len(brightest))]
     turns = np.array([Attitude(yaw_rad=yaw).matrix for yaw in yaws])
-    own = np.zeros(len(state.directions), int)
-    own[fit.seen.landmark] = fit.seen.camera
+    own = own_camera(fit.seen, len(state.directions))
     return replace(
         state,
         attitudes=turns @ state.attitudes,
