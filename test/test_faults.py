@@ -42,7 +42,8 @@ def test_a_node_is_killed_and_comes_back(five, node):
             wait_for(lambda: any(health.is_dim(health.seen[-1])), START_S, 'the dimming')
         five.start_again(node)
         wait_for(lambda: five.endpoints(node) - known, START_S, f'{node} in the graph')
-    (after,) = wait_for(lambda: health.overlaps, START_S, 'the overlap').overlaps
+    wait_for(lambda: health.is_measured, START_S, 'the overlap')
+    (after,) = health.overlaps.overlaps
     assert after.offset_x_px == pytest.approx(before.offset_x_px, abs=SAME_PX)
     assert after.found
 

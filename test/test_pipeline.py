@@ -26,7 +26,7 @@ SCHEDULING = 0.2
 def start(rig, watcher, *, composed=False, folder=None, **capture):
     rig.start_all(composed, camera_parameters(folder), frame_rate_hz=RATE_HZ, **capture)
     wait_for(lambda: rig.check_alive() or watcher.newest, START_S, 'a first panorama')
-    wait_for(lambda: watcher.projection and watcher.is_measured, START_S, 'the latched topics')
+    wait_for(lambda: watcher.is_measured, START_S, 'the latched topics')
 
 
 def captured_stamps(watcher):

@@ -55,11 +55,7 @@ def message(watcher):
 
 
 def check_panorama(rig, watcher):
-    wait_for(
-        lambda: rig.check_alive() or watcher.is_measured,
-        START_S,
-        'an overlap',
-    )
+    wait_for(lambda: rig.check_alive() or watcher.is_measured, START_S, 'an overlap')
     (overlap,) = watcher.overlaps.overlaps
     assert overlap.found
     true_px = radians(140) * watcher.projection.focal_px
@@ -156,8 +152,9 @@ def test_a_dual_fisheye_frame_becomes_a_closed_panorama(rig, watcher):
     )
     projection = watcher.projection
     assert projection.width == pytest.approx(2 * pi * projection.focal_px)
-    wait_for(lambda: watcher.newest, START_S, 'it')
-    assert watcher.picture().shape[1] == projection.width
+    wait_for(
+        lambda: watcher.newest and watcher.newest.width == projection.width, START_S, 'its picture'
+    )
 
 
 def test_a_region_outside_the_frame_stops_only_its_own_camera(rig, watcher, tmp_path, both):

@@ -67,8 +67,16 @@ class Watcher:
 
     @property
     def is_measured(self) -> bool:
-        """Whether every overlap was looked for; a lone camera is shown for a while too."""
-        return self.overlaps is not None and all(each.method for each in self.overlaps.overlaps)
+        """Whether every overlap was looked for, and the projection drawn with them came.
+
+        A lone camera is shown for a while too, and each topic arrives on its own.
+        """
+        return (
+            self.overlaps is not None
+            and self.projection is not None
+            and all(each.method for each in self.overlaps.overlaps)
+            and stamp_ns(self.projection.header) >= stamp_ns(self.overlaps.header)
+        )
 
     def restart(self) -> None:
         """Forget what came so far."""
