@@ -63,6 +63,9 @@ def check_camera_fault(field: Field, break_it, capture: str, stitcher: str) -> N
             and 'left: no picture for' in health.status[stitcher].message
         )
 
+    # All is well, too, after a try that a busy machine was too slow for.
+    wait_for(lambda: health.level(capture) < ERROR, START_S, 'a capture without ERROR')
+    wait_for(lambda: health.level(stitcher) == OK, START_S, 'a stitcher that is well')
     with field.injured(f'left camera: {break_it.__name__}', 'left'):
         mend = break_it(cameras)
         try:

@@ -83,8 +83,14 @@ def test_a_bearing_is_marked_where_the_projection_says(rig, watcher, bearing_deg
     words = ['--ros-args', '-p', f'bearing_deg:={bearing_deg}']
     rig.run('example', [sys.executable, program, *words])
     wait_until_measured(rig, watcher)
-    marked = watcher.picture_on('panorama/marked', START_S)
     projection = watcher.projection
+    size = projection.height, projection.width
+
+    def marked_panorama():
+        picture = watcher.picture_on('panorama/marked', START_S)
+        return [picture] if picture.shape[:2] == size else []
+
+    (marked,) = wait_for(marked_panorama, START_S, 'a mark in that projection')
     x_px = round(projection.center_x_px + projection.focal_px * radians(bearing_deg))
     difference = np.abs(marked[:, x_px].astype(int) - RED_BGR)
     assert difference.max() <= COLOUR_TOLERANCE
@@ -116,6 +122,14 @@ def test_two_robots_have_a_panorama_each(rig, domain, is_real):
     with Watcher(domain, 'alpha') as alpha, Watcher(domain, 'bravo') as bravo:
         for robot in (alpha, bravo):
             wait_for(lambda robot=robot: rig.check_alive() or robot.newest, START_S, 'a panorama')
-            nodes = robot.node.get_node_names_and_namespaces()
-            assert sorted(ns for name, ns in nodes if name == 'panorama') == ['/alpha', '/bravo']
+        for robot in (alpha, bravo):
+            graph = robot.node.get_node_names_and_namespaces
+            wait_for(
+                lambda graph=graph: (
+                    sorted(space for name, space in graph() if name == 'panorama')
+                    == ['/alpha', '/bravo']
+                ),
+                START_S,
+                'a node for each robot',
+            )
     rig.stop('launch')

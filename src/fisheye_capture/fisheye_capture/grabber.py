@@ -143,6 +143,7 @@ class Grabber:
             finally:
                 self._release()
             self._stopping.wait(wait_s)
+        self._release()  # stopped before its first turn
 
     def _read(self, source):
         while not self._stopping.is_set():

@@ -34,7 +34,7 @@ def test_it_hands_over_frames_and_knows_the_camera(grab, wait_until):
     wait_until(lambda: len(frames) > 10, 'frames')
     assert grabber.camera.lens.width == 640
     assert grabber.reason == ''
-    assert grabber.rate.hz == pytest.approx(50, rel=0.5)
+    wait_until(lambda: grabber.rate.hz == pytest.approx(50, rel=0.5), 'the rate')
     grabber.stop()
     assert len(frames) == grabber.frames
 
@@ -59,12 +59,12 @@ def test_an_http_camera_is_lost_and_comes_back(grab, wait_until):
     camera.stop()
     wait_until(lambda: grabber.reason, 'the loss')
     wait_until(lambda: grabber.attempts > 1, 'vain attempts')
-    assert 'refuses the connection' in grabber.reason
+    wait_until(lambda: 'refuses the connection' in grabber.reason, 'the reason')
     count = len(frames)
     camera = MjpegServer(jpeg(180), port=camera.port)
     wait_until(lambda: len(frames) > count, 'new frames')
     assert frames[count].image.mean() > 170
-    assert (grabber.reason, grabber.attempts) == ('', 0)
+    wait_until(lambda: (grabber.reason, grabber.attempts) == ('', 0), 'the all-clear')
     camera.stop()
 
 
@@ -81,7 +81,7 @@ def test_a_camera_whose_pictures_are_refused_is_opened_anew(grab, wait_until):
     assert (grabber.reason, grabber.frames) == ('the picture has the wrong size', 0)
     refuses.clear()
     wait_until(lambda: grabber.frames, 'frames')
-    assert (grabber.reason, grabber.attempts) == ('', 0)
+    wait_until(lambda: (grabber.reason, grabber.attempts) == ('', 0), 'the all-clear')
 
 
 def test_garbage_from_a_camera_is_never_handed_over(grab, wait_until):
@@ -141,14 +141,35 @@ def test_each_lost_source_is_closed_before_it_is_opened_again(grab, wait_until, 
     grabber, frames = grab('any')
     wait_until(lambda: grabber.reason == 'over', 'the end')
     assert [frame.stamp_ns for frame in frames] == [1, 2]
-    assert all(source.is_closed for source in opened)
+    wait_until(lambda: all(source.is_closed for source in opened), 'the release')
+
+
+def test_who_is_stopped_before_it_reads_releases_the_source(grab, wait_until, monkeypatch):
+    stopped = Event()
+
+    class LateThread(threading.Thread):
+        def run(self):
+            stopped.wait()
+            super().run()
+
+    source = Prepared([])
+    source.interrupt = stopped.set
+    monkeypatch.setattr(grabber_module, 'Thread', LateThread)
+    monkeypatch.setattr(grabber_module, 'open_source', lambda settings: source)
+    grabber, frames = grab('any')
+    grabber.stop()
+    wait_until(lambda: source.is_closed, 'the release')
+    assert not frames
 
 
 @pytest.mark.parametrize('source', ['97', 'http://127.0.0.1:1/', 'synthetic'])
-def test_it_stops_in_every_state(grab, source):
-    grabber, _ = grab(source, frame_rate_hz=0.1, reconnect_max_s=3600.0)
+def test_it_stops_in_every_state(grab, wait_until, source):
+    grabber, _ = grab(source, frame_rate_hz=0.01, reconnect_max_s=3600.0)
     grabber.stop()
-    assert not [one for one in threading.enumerate() if one.name.startswith('grab ')]
+    wait_until(
+        lambda: not [one for one in threading.enumerate() if one.name.startswith('grab ')],
+        'the end of the thread',
+    )
 
 
 def test_changes_are_told(settings, wait_until, monkeypatch):

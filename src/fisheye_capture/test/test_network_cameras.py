@@ -53,7 +53,7 @@ def open_stream(settings):
     sources = []
 
     def open_it(url, **changes):
-        changes = {'frame_rate_hz': RATE_HZ, **changes}
+        changes = {'frame_rate_hz': RATE_HZ, 'silence_timeout_s': 60.0, **changes}
         sources.append(StreamSource(settings(url, **changes)))
         return sources[-1]
 
@@ -111,8 +111,8 @@ def test_a_keyframe_each_10_s_is_enough_where_the_first_comes_at_once(camera, op
 
 def test_a_keyframe_that_does_not_come_is_said(camera, open_stream):
     url = camera('rtsp', '--gop', '600', '--join-late')
-    source = open_stream(url, first_picture_timeout_s=5.0)
-    with pytest.raises(SourceLostError, match=r'but no whole keyframe for \d s; set its GOP'):
+    source = open_stream(url, silence_timeout_s=4.0, first_picture_timeout_s=9.0)
+    with pytest.raises(SourceLostError, match=r'but no whole keyframe for \d+ s; set its GOP'):
         for _ in range(300):
             source.read()
     assert 'no whole keyframe' in source.note
@@ -151,14 +151,14 @@ def test_in_grey_a_jpeg_is_decoded(camera, open_stream):
 
 
 def test_what_a_lost_camera_left_in_the_decoder_is_not_shown(camera, open_stream):
-    source = open_stream(camera('udp'), silence_timeout_s=1.0)
+    source = open_stream(camera('udp'), silence_timeout_s=5.0)
     ages(source, 10)
     camera.processes[0].kill()
     true = []
     with pytest.raises(SourceLostError, match='stopped sending pictures'):
         while True:
             true += list(ages(source, 1)[0])
-    assert all(age < 500 for age in true)
+    assert all(age < 4500 for age in true)
 
 
 def test_the_delay_of_a_camera_is_taken_off(camera, open_stream):
@@ -204,12 +204,12 @@ def test_a_redirect_to_another_camera_is_followed(camera, open_stream):
         ('http://127.0.0.1:1/x', 'refuses the connection'),
         ('rtsp://127.0.0.1:1/x', 'refuses the connection'),
         ('rtsp://camera.invalid/x', 'cannot be found; is the name of the host right?'),
-        ('udp://127.0.0.1:45999', 'gave no picture data within 1 s'),
+        ('udp://127.0.0.1:61999', 'gave no picture data within 1 s'),
     ],
 )
 def test_who_is_not_there_is_named(open_stream, url, sentence):
     with pytest.raises(SourceLostError) as refused:
-        open_stream(url, connect_timeout_s=1.0).read()
+        open_stream(url, connect_timeout_s=1.0 if url.startswith('udp') else 10.0).read()
     assert str(refused.value).startswith(f'{url} {sentence}')
 
 

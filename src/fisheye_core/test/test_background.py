@@ -6,6 +6,7 @@ import pytest
 
 from fisheye_core.background import Background
 from fisheye_core.errors import BugError, FisheyeError, OverlapError
+from fisheye_testing.waiting import wait_for
 
 
 @pytest.fixture
@@ -48,7 +49,9 @@ def test_what_was_not_begun_is_cancelled(background):
 
     first, second = background.do(slow), background.do(int)
     begun.wait()
-    threading.Timer(0.05, may_end.set).start()
-    background.stop()
+    stopping = threading.Thread(target=background.stop)
+    stopping.start()
+    wait_for(second.cancelled, what='the end of what was not begun')
+    may_end.set()
+    stopping.join()
     assert first.result() is None
-    assert second.cancelled()

@@ -45,7 +45,8 @@ def test_each_picture_is_there_with_its_own_packet(packets):
     assert not decoder.wants_keyframe
 
 
-def test_large_pictures_that_are_cut_into_slices_are_whole():
+def test_large_pictures_that_are_cut_into_slices_are_whole(monkeypatch):
+    monkeypatch.setattr('os.cpu_count', lambda: 2)
     still = np.full((1000, 1100), 90, np.uint8)
     large = encoded([cv2.cvtColor(still + np.uint8(n), cv2.COLOR_GRAY2BGR) for n in range(4)])
     assert all([kind for kind, *_ in units(data)].count(1) == 2 for data in large[1:])

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
-from fisheye_testing.image_message import to_array
+from fisheye_testing.image_message import stamp_ns, to_array
 from fisheye_testing.waiting import wait_for
 from fisheye_testing.watcher import Watcher
 
@@ -15,6 +15,8 @@ _BRIGHT_SHARE = 0.7
 """A side darker than this share of its usual level is dimmed."""
 _LONG_GAP_S = 0.4
 """Between two panoramas; shorter ones are the breath of a busy machine."""
+_SETTLED = 60
+"""Panoramas that look alike: for longer than a camera that a busy machine holds up is dimmed."""
 _STEP_PX = 8
 _START_S = 60.0
 _LOOKS = 5
@@ -61,8 +63,8 @@ class Health(Watcher):
         self.seen = []
 
         def steady():
-            levels = np.array([entry.levels for entry in self.seen[-15:]])
-            return len(levels) == 15 and (np.ptp(levels, axis=0) < 5).all()
+            levels = np.array([entry.levels for entry in self.seen[-_SETTLED:]])
+            return len(levels) == _SETTLED and (np.ptp(levels, axis=0) < 5).all()
 
         wait_for(steady, _START_S, 'a steady panorama')
         self._usual = np.array(self.seen[-1].levels)
@@ -100,7 +102,7 @@ class Health(Watcher):
         image = to_array(message)[::_STEP_PX, ::_STEP_PX]
         quarter = image.shape[1] // 4
         levels = float(image[:, :quarter].mean()), float(image[:, -quarter:].mean())
-        self.seen.append(SeenPanorama(time.monotonic(), self.stamps_ns[-1], levels))
+        self.seen.append(SeenPanorama(time.monotonic(), stamp_ns(message.header), levels))
 
     def _take_status(self, message) -> None:
         self.status.update({status.name: status for status in message.status})

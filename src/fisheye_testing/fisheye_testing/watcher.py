@@ -118,8 +118,9 @@ class Watcher:
                 self._executor.spin_once(timeout_sec=0.1)
 
     def _take(self, message) -> None:
-        self.stamps_ns.append(stamp_ns(message.header))
-        self.latencies_ms.append((time.time_ns() - self.stamps_ns[-1]) / 1e6)
+        taken_ns = stamp_ns(message.header)
+        self.stamps_ns.append(taken_ns)
+        self.latencies_ms.append((time.time_ns() - taken_ns) / 1e6)
         self.newest = message
 
     def _take_projection(self, message) -> None:

@@ -58,12 +58,11 @@ def test_views_are_collected_from_a_topic(waving, capsys):
 
 
 def test_what_was_collected_until_the_camera_stops_is_used(waving, monkeypatch, capsys):
-    monkeypatch.setattr(collect_node, '_LONGEST_WAIT_S', 2.0)
-
     class Stopping(LiveGathering):
         def add(self, picture):
             super().add(picture)
             if len(self.collector.views) == 2:
+                monkeypatch.setattr(collect_node, '_LONGEST_WAIT_S', 2.0)
                 waving.set()
 
     gathering = Stopping(Detector(STANDARD['circles']))

@@ -27,7 +27,9 @@ def test_a_nonsense_camera_info_leaves_the_good_one_in_use(make_bench, wrong):
     bench.until(lambda: bench.pictures, 'a picture')
     bench.pictures.clear()
     bench.until(lambda: len(bench.pictures) > 3, 'pictures still', **wrong)
-    bench.until(lambda: len(bench.pictures) > 6, 'pictures with the good one again')
+    bench.until(
+        lambda: len(bench.pictures) > 6 and bench.projections, 'pictures with the good one again'
+    )
     assert len(bench.projections) == 1
 
 

@@ -81,7 +81,7 @@ def test_what_is_seen_is_never_0(make_bench):
 
 def test_the_maps_are_rebuilt_only_for_a_real_change(make_bench):
     bench = make_bench()
-    bench.until(lambda: len(bench.pictures) > 10, 'pictures')
+    bench.until(lambda: len(bench.pictures) > 10 and bench.projections, 'pictures')
     assert len(bench.projections) == 1
     longer = make_lens('equidistant', 160, 120, [60, 0, 79.5, 0, 60, 59.5, 0, 0, 1], [0] * 4)
     bench.until(lambda: len(bench.projections) == 2, 'another projection', lens=longer)
@@ -92,7 +92,11 @@ def test_a_dark_rim_is_known_before_the_first_projection_is_told(make_bench):
     y, x = np.mgrid[:120, :160]
     circle = np.where(np.hypot(x - 79.5, y - 59.5) < 50, 200, 0).astype(np.uint8)
     bench = make_bench()
-    bench.until(lambda: len(bench.pictures) > 6, 'pictures', picture=cv2.merge([circle] * 3))
+    bench.until(
+        lambda: len(bench.pictures) > 6 and bench.projections,
+        'pictures',
+        picture=cv2.merge([circle] * 3),
+    )
     (projection,) = bench.projections
     assert projection.width < UndistortSettings().surface_of(LENS).width
 

@@ -78,10 +78,15 @@ def test_a_bug_is_told_until_it_looks_again(rig, watch, monkeypatch):
     assert watch.complaints() == []
 
 
-def test_it_looks_once_a_second(rig, watch):
+def test_it_looks_once_a_second(rig, watch, monkeypatch):
+    now_s = [100.0]
+    monkeypatch.setattr(seam_watch, 'monotonic', lambda: now_s[0])
     assert watch.is_due
-    watch.take(seen(), rig.overlaps)
+    watch.take(seen(), rig.overlaps).result(DEADLINE_S)
+    now_s[0] += 0.9
     assert not watch.is_due
+    now_s[0] += 0.2
+    assert watch.is_due
 
 
 def test_many_moments_sharpen_a_measurement_that_they_agree_with(rig, watch):
