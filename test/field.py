@@ -7,12 +7,12 @@ from math import radians
 from pathlib import Path
 
 import cv2
-from again import TooSlowError
 
 from fisheye_capture.scene import Scene
 from fisheye_capture.synthetic import synthetic_lens
 from fisheye_geometry.attitude import Attitude
 from fisheye_geometry.camera_file import Camera, write_camera
+from fisheye_testing.again import TooSlowError
 from fisheye_testing.health import Health
 from fisheye_testing.mjpeg_server import MjpegServer
 from fisheye_testing.rig import SIDES, RigProcesses
@@ -177,6 +177,8 @@ class Field(RigProcesses):
         )
         self.check_alive()
         assert others == {name: p.pid for name, p in self.processes.items() if name != node}
+        came = [entry.stamp_ns for entry in self.health.seen if entry.arrived_s > begin_s]
+        assert came == sorted(set(came)), 'each panorama once, in order'
         if any(part not in sides and cost[part] >= UNNOTICED_S for part in cost):
             raise TooSlowError(f'{what}: {cost}')
         print('nothing else was affected')

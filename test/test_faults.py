@@ -4,10 +4,10 @@ import signal
 
 import camera_faults
 import pytest
-from again import asked_again
 from camera_faults import ERROR, OK, check_camera_fault
 from field import START_S
 
+from fisheye_testing.again import asked_again
 from fisheye_testing.rig import SEPARATE
 from fisheye_testing.waiting import wait_for
 

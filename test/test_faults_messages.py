@@ -5,7 +5,6 @@ import time
 
 import numpy as np
 import pytest
-from again import TooSlowError, asked_again
 from field import START_S
 from fisheye_msgs.msg import Projection
 from hypothesis import HealthCheck, assume, given, settings
@@ -18,6 +17,7 @@ from fisheye_bridge.images import from_jpeg
 from fisheye_bridge.qos import IMAGE, LATCHED
 from fisheye_bridge.stamps import stamp_of
 from fisheye_core.errors import FisheyeError
+from fisheye_testing.again import TooSlowError, asked_again
 from fisheye_testing.health import usage
 from fisheye_testing.image_message import to_message
 from fisheye_testing.waiting import wait_for

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from again import asked_again
 from field import START_S
 from namespaces import Namespace
 
+from fisheye_testing.again import asked_again
 from fisheye_testing.domains import unused_domain
 from fisheye_testing.health import usage
 from fisheye_testing.rig import SEPARATE, SIDES, RigProcesses

@@ -4,10 +4,10 @@ import os
 
 import camera_faults
 import pytest
-from again import asked_again
 from camera_faults import check_camera_fault
 from field import START_S, write_pictures
 
+from fisheye_testing.again import asked_again
 from fisheye_testing.health import usage
 from fisheye_testing.rig import SIDES
 from fisheye_testing.waiting import wait_for

@@ -5,12 +5,12 @@ import signal
 from pathlib import Path
 
 import pytest
-from again import TooSlowError, asked_again
 from field import START_S, STOP_S, write_pictures
 from fisheye_msgs.srv import CalibrateOverlap
 from sensor_msgs.msg import Image
 
 from fisheye_bridge.qos import IMAGE_INPUT
+from fisheye_testing.again import TooSlowError, asked_again
 from fisheye_testing.domains import unused_domain
 from fisheye_testing.health import Health
 from fisheye_testing.mjpeg_server import MjpegServer, jpeg

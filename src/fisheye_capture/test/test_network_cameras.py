@@ -14,6 +14,7 @@ from fisheye_capture.stream import StreamSource
 from fisheye_testing import network_camera
 from fisheye_testing.http_camera import HttpServer
 from fisheye_testing.painted_time import age_ms, read_image
+from fisheye_testing.waiting import PATIENCE_S, wait_for
 
 RATE_HZ = 20.0
 PERIOD_MS = 1000 / RATE_HZ
@@ -83,10 +84,18 @@ def test_the_age_that_is_told_is_the_true_one_and_does_not_grow(
     arguments, changes = KINDS[kind]
     source = open_stream(camera(*arguments), **changes)
     ages(source, 5)
-    true, told = ages(source, 30, pause_s)
-    assert not np.isnan(true).any()
-    assert abs(np.median(true - told)) < PERIOD_MS
-    assert np.median(true[-10:]) < np.median(true[:10]) + 2 * PERIOD_MS
+    before, _ = ages(source, 10, pause_s)
+
+    def are_told_and_as_before():
+        true, told = ages(source, 20, pause_s)
+        assert not np.isnan(true).any()
+        return (
+            abs(np.median(true - told)) < PERIOD_MS
+            and np.median(true[-10:]) < np.median(before) + 2 * PERIOD_MS
+        )
+
+    # Other work on the machine ends some time; a delay that has grown stays.
+    wait_for(are_told_and_as_before, PATIENCE_S, 'ages that are told')
 
 
 def test_a_playlist_comes_at_its_own_rate(camera, open_stream):
@@ -100,8 +109,12 @@ def test_a_playlist_comes_at_its_own_rate(camera, open_stream):
             break
         except SourceLostError:
             assert time.monotonic() < deadline_s, 'no segment was written'
-    stamps_ns = [source.read().stamp_ns for _ in range(40)]
-    assert np.median(np.diff(stamps_ns)) / 1e6 == pytest.approx(PERIOD_MS, rel=0.3)
+
+    def is_at_its_rate():
+        stamps_ns = [source.read().stamp_ns for _ in range(40)]
+        return np.median(np.diff(stamps_ns)) / 1e6 == pytest.approx(PERIOD_MS, rel=0.3)
+
+    wait_for(is_at_its_rate, PATIENCE_S, 'its rate')
 
 
 def test_a_keyframe_each_10_s_is_enough_where_the_first_comes_at_once(camera, open_stream):

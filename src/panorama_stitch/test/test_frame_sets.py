@@ -40,6 +40,7 @@ class Hand:
         for module in (stale, frame_sets_module):
             monkeypatch.setattr(module, 'monotonic', lambda: self.now_s)
         self.frames = frame_sets()
+        self.stamps_ns, self.back_s = [], 0.0
 
     def feed(self, count, rates_hz, phase_s=0.02):
         """Return for each frame set whether a camera was stale, and how long none paired."""
@@ -51,10 +52,18 @@ class Hand:
         )
         for self.now_s, camera in due:
             unpaired_s = self.frames.unpaired_s
-            if self.frames.take(camera, round(self.now_s * 1e9), IMAGE, 'bgr8'):
-                told.append((bool(self.frames.get().ages_s), unpaired_s))
+            if came := self.take(camera, self.now_s):
+                told.append((bool(came.ages_s), unpaired_s))
         self.now_s = begin_s + count / max(rates_hz.values())
         return told
+
+    def take(self, camera, stamp_s):
+        """Return the frame set that a frame completes, if any."""
+        if not self.frames.take(camera, round((stamp_s - self.back_s) * 1e9), IMAGE, 'bgr8'):
+            return None
+        came = self.frames.get()
+        self.stamps_ns.append(came.stamp_ns)
+        return came
 
 
 @pytest.mark.parametrize(('rate_hz', 'phase_s'), [(0.2, 0.02), (1, 0.02), (1, 0.09), (1.9, 0.02)])
@@ -81,3 +90,27 @@ def test_a_long_silence_is_no_period(monkeypatch):
         hand.feed(3, {'left': 30, 'right': 30}, 0.0)
         hand.now_s += 60.0
     assert list(hand.frames.ages_s()) == ['left', 'right']
+
+
+@pytest.mark.parametrize('queued', [0, 1, 3])
+@pytest.mark.parametrize('phase_s', [-0.012, 0.0, 0.012])
+def test_nothing_is_shown_again_when_a_camera_comes_back(monkeypatch, phase_s, queued):
+    hand, both = Hand(monkeypatch), {'left': 30, 'right': 30}
+    hand.feed(12, both, phase_s)
+    told = hand.feed(30, {'left': 30})
+    assert told[-1] == (True, 0.0)
+    for k in range(queued, 0, -1):  # what waited in a process that paused
+        hand.take('right', hand.now_s + phase_s - k / 30)
+    told = hand.feed(12, both, phase_s)
+    assert told[-9:] == [(False, 0.0)] * 9
+    assert hand.stamps_ns == sorted(set(hand.stamps_ns))
+
+
+def test_clocks_that_jump_back_while_a_camera_is_stale_pair_again(monkeypatch):
+    hand, both = Hand(monkeypatch), {'left': 30, 'right': 30}
+    hand.feed(12, both)
+    assert hand.feed(30, {'left': 30})[-1] == (True, 0.0)
+    hand.stamps_ns.clear()
+    hand.back_s = 3600.0
+    assert hand.feed(12, both)[-9:] == [(False, 0.0)] * 9
+    assert hand.stamps_ns[-9:] == sorted(set(hand.stamps_ns[-9:]))

@@ -77,10 +77,14 @@ class FrameSets:
                 self._color = self._color or encoding
                 image = converted(image, encoding, self._color)
             self._stale.note(camera, image)
-            frames = self._paired(camera, _Frame(image, stamp_ns))
-            frames = frames or self._beside_stale(camera, stamp_ns)
+            by_stamp = self._settings.pair_by == 'stamp'
+            when_ns = stamp_ns if by_stamp else monotonic_ns()
+            frames = self._paired(camera, when_ns, _Frame(image, stamp_ns))
             if frames is None:
-                return False
+                frames = self._beside_stale(camera, stamp_ns)
+                if frames is None:
+                    return False
+                self.pairing.pass_over(when_ns)
             self._paired_s = monotonic()
             self._waiting.put(frames)
             return True
@@ -146,10 +150,8 @@ class FrameSets:
         """Return the cameras that are stale, each with the age of its last frame, s."""
         return self._stale.ages_s(self._settings.stale_after_s)
 
-    def _paired(self, camera: str, frame: _Frame) -> FrameSet | None:
-        """Pair a frame; return the frame set that it completes."""
-        by_stamp = self._settings.pair_by == 'stamp'
-        when_ns = frame.stamp_ns if by_stamp else monotonic_ns()
+    def _paired(self, camera: str, when_ns: int, frame: _Frame) -> FrameSet | None:
+        """Pair a frame by a moment; return the frame set that it completes."""
         paired = self.pairing.add(camera, when_ns, frame, frame.image.nbytes)
         if paired is None:
             return None

@@ -56,13 +56,15 @@ class _Track:
     clock: FrameClock = field(default_factory=FrameClock)
     unpaired: int = 0
 
-    def add(self, new: Stamped, nbytes: int) -> None:
+    def add(self, new: Stamped, nbytes: int) -> bool:
+        """Let a frame wait; return whether the clock jumped back."""
         is_later = self.clock.last_ns is None or new.stamp_ns > self.clock.last_ns
         smooth_ns = self.clock.tick(new.stamp_ns)
         if not is_later:
             # The clock jumped back: what waits belongs to another time.
             self.clear()
         self.waiting.append(_Waiting(new, smooth_ns, nbytes))
+        return not is_later
 
     def drop(self) -> None:
         self.unpaired += 1
@@ -106,6 +108,7 @@ class FramePairing:
         self.max_skew_ns = max_skew_ns
         self.skews_ns: deque[int] = deque(maxlen=_SKEWS)
         self.is_full = False
+        self._passed_ns = -inf
         self._lags_ns: deque[tuple[str, int]] = deque(maxlen=_LAGS)
 
     @property
@@ -137,6 +140,11 @@ class FramePairing:
         for track in self._tracks.values():
             track.clear()
 
+    def pass_over(self, until_ns: int) -> None:
+        """Drop all frames up to a moment, now and as they come: something newer was shown."""
+        self.clear()
+        self._passed_ns = until_ns
+
     def add(self, camera: str, stamp_ns: int, frame: Any, nbytes: int = 0) -> list[Stamped] | None:
         """Add a frame; return the group that it completes, in the order of the cameras.
 
@@ -149,7 +157,12 @@ class FramePairing:
         nbytes
             The memory that it takes while it waits.
         """
-        self._tracks[camera].add(Stamped(stamp_ns, frame), nbytes)
+        track = self._tracks[camera]
+        if track.add(Stamped(stamp_ns, frame), nbytes):
+            self._passed_ns = -inf
+        elif stamp_ns <= self._passed_ns:
+            track.clear()
+            return None
         self._make_room(camera, stamp_ns)
         tracks = list(self._tracks.values())
         while all(track.waiting for track in tracks):
