@@ -79,7 +79,8 @@ def test_a_browser_that_keeps_nothing_for_sites_looks_all_the_same(
 
 @pytest.mark.parametrize('kind', ['silent', 'idle', 'drawn'])
 def test_the_page_stays_live_under_attack(browser, serve, attackers, kind):
-    server = serve(SURFACES[0], painted(SURFACES[0], 0, 0), host='0.0.0.0', public=True)
+    image = painted(SURFACES[0], 0, 0)
+    server = serve(SURFACES[0], image, stale_after_s=1.0, host='0.0.0.0', public=True)
     server.tell(rate_hz=5.0)
     url, token = elsewhere(server)
     attackers(kind, int(url.rstrip('/').rpartition(':')[2]))

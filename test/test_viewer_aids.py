@@ -277,7 +277,8 @@ def test_keys_switch_the_aids_and_the_page_remembers(browser, serve):
 
 
 def test_an_aid_that_fails_is_switched_off_and_the_picture_goes_on(browser, serve):
-    page = page_with(browser, serve(SURFACES[0], painted(SURFACES[0], 0, 0)), 'edges')
+    server = serve(SURFACES[0], painted(SURFACES[0], 0, 0), stale_after_s=1.0)
+    page = page_with(browser, server, 'edges')
     script = "document.querySelector('#rear canvas').getContext = () => null"
     page.driver.execute_script(script)
     page.press('r')

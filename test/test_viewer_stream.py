@@ -1,5 +1,6 @@
 """How pictures come to the viewer's page: as H.264 or JPEG, how late, and after a cut."""
 
+import re
 import socket
 import threading
 import time
@@ -73,6 +74,13 @@ def test_a_picture_that_cannot_be_decoded_is_made_good_by_a_keyframe(
     before_the_page("""
         const plain = VideoDecoder.prototype.decode;
         window.decoded = [];
+        window.opened = 0;
+        window.WebSocket = class extends WebSocket {
+          constructor(...words) {
+            super(...words);
+            opened += 1;
+          }
+        };
         VideoDecoder.prototype.decode = function decode(chunk) {
           decoded.push(chunk.type);
           if (decoded.length === 5) throw new Error('once');
@@ -81,8 +89,16 @@ def test_a_picture_that_cannot_be_decoded_is_made_good_by_a_keyframe(
     """)
     server = serve(SURFACES[0], painted(SURFACES[0], 31.0, 12.0))
     page = Page(browser, server.url)
-    page.until(lambda: len(browser.execute_script('return decoded')) > 8, 'more pictures')
-    kinds = browser.execute_script('return decoded')
+
+    def decoded():
+        opened, kinds = browser.execute_script('return [opened, decoded]')
+        if opened > 1:  # after a pause the page connects anew, and begins with a keyframe
+            browser.refresh()
+        elif len(kinds) > 8:
+            return kinds
+        return None
+
+    kinds = page.until(decoded, 'more pictures')
     assert kinds[:7] == ['key', 'delta', 'delta', 'delta', 'delta', 'key', 'delta']
     assert format_of(page) == ('H.264', '')
 
@@ -151,7 +167,7 @@ class PoorLink:
 
 
 def test_the_page_comes_back_by_itself_when_its_link_was_silent(browser, serve):
-    server = serve(SURFACES[0], painted(SURFACES[0], 0, 0))
+    server = serve(SURFACES[0], painted(SURFACES[0], 0, 0), stale_after_s=1.0)
     with closing(PoorLink(urlsplit(server.url).port)) as relay:
         page = Page(browser, f'http://127.0.0.1:{relay.port}/')
         page.until(lambda: page.text('condition') == 'Live', 'a live picture')
@@ -159,7 +175,7 @@ def test_the_page_comes_back_by_itself_when_its_link_was_silent(browser, serve):
         page.until(lambda: 'no connection' in page.text('veil'), 'the loss')
         relay.mend()
         page.until(lambda: page.text('condition') == 'Live', 'a live picture')
-        assert page.text('format') == 'H.264'
+        page.until(lambda: page.text('format') == 'H.264', 'H.264')
 
 
 def test_a_slow_link_shows_fewer_pictures(browser, serve, before_the_page):
@@ -213,9 +229,11 @@ def test_a_picture_that_stands_still_is_seen_to(browser, serve):
     server = serve(SURFACES[0], painted(SURFACES[0], 0, 0), stale_after_s=0.5)
     page = Page(browser, server.url)
     page.until(lambda: page.text('condition') == 'Live', 'a live picture')
-    assert not page.find('veil').is_displayed()
+    page.until(lambda: not page.find('veil').is_displayed(), 'no veil')
     server.fall_silent()
     page.until(lambda: page.find('veil').is_displayed(), 'a veil')
-    page.until(lambda: page.text('veil') == 'No picture for 1 s', 'the age')
+    # What says exactly 1 s stands there for a second only.
+    age = re.compile(r'No picture for [1-9]\d* s')
+    page.until(lambda: age.fullmatch(page.text('veil')), 'the age')
     server.stop()
     page.until(lambda: 'no connection' in page.text('veil'), 'the loss of the connection')

@@ -122,14 +122,18 @@ class Page:
 
 @pytest.fixture
 def serve():
-    """Return a function that shows one picture over and over, until `stop` is called."""
+    """Return a function that shows one picture over and over, until `stop` is called.
+
+    None becomes stale unless a test asks for it: a busy machine may pause for more than a second,
+    and a page whose picture is dead is grey.
+    """
     ended, faults = [], []
 
     def start(surface, image, wraps=False, tls=None, orientation=None, **settings):
         measured = Future()
         measured.set_result('measured anew')
         server = ViewerServer(
-            ViewerSettings(port=0, **settings),
+            ViewerSettings(**{'port': 0, 'stale_after_s': 60.0, **settings}),
             calibrate=lambda: measured,
             watched=lambda: None,
             report=lambda sentence, trace: faults.append(trace),
