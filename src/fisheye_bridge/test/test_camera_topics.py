@@ -8,6 +8,7 @@ import rclpy
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
+from fisheye_bridge import camera_topics
 from fisheye_bridge.camera_topics import CameraSubscription
 from fisheye_bridge.diagnostics import WARN, Report
 from fisheye_core.errors import GeometryError
@@ -71,7 +72,8 @@ def test_no_calibration_freezes_the_node(camera):
     assert camera.lenses, 'it is a possible lens'
 
 
-def test_a_calibration_that_was_refused_is_not_looked_at_again_at_once(camera):
+def test_a_calibration_that_was_refused_is_not_looked_at_again_at_once(camera, monkeypatch):
+    monkeypatch.setattr(camera_topics, '_AGAIN_S', 60.0)
     camera.refuses = True
     for _ in range(30):
         camera.show(camera_info())

@@ -13,6 +13,7 @@ from fisheye_bridge import shared_memory
 from fisheye_bridge.shared_memory import prepare
 
 PROFILE = 'FASTRTPS_DEFAULT_PROFILES_FILE'
+NOW_S = 1e9
 
 
 @pytest.fixture
@@ -34,7 +35,7 @@ def segment(folder, name, age_s):
     lock = folder / f'fastrtps_{name}_el'
     (folder / f'fastrtps_{name}').write_bytes(b'x' * 100)
     lock.touch()
-    os.utime(lock, (0, lock.stat().st_mtime - age_s))
+    os.utime(lock, (0, NOW_S - age_s))
     return lock
 
 
@@ -88,10 +89,11 @@ def test_another_middleware_is_left_alone(monkeypatch, tmp_path):
     assert prepare(tmp_path / 'nowhere') == ''
 
 
-def test_only_what_the_dead_left_is_cleared(room, tmp_path):
+def test_only_what_the_dead_left_is_cleared(room, tmp_path, monkeypatch):
     room(1000)
+    monkeypatch.setattr(shared_memory.time, 'time', lambda: NOW_S)
     dead, alive = segment(tmp_path, '0' * 16, 60), segment(tmp_path, '1' * 16, 60)
-    young, port = segment(tmp_path, '2' * 16, 0), segment(tmp_path, 'port7000', 60)
+    young, port = segment(tmp_path, '2' * 16, 0.5), segment(tmp_path, 'port7000', 60)
     with alive.open('rb') as owner:
         fcntl.flock(owner, fcntl.LOCK_EX)
         prepare(tmp_path)
