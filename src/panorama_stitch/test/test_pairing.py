@@ -173,6 +173,19 @@ def test_a_camera_that_comes_late_by_more_loses_no_more_than_its_lag(rates_hz, l
     assert paired.worst_skew_ms < SHIFT * 1000 / first + 2.0
 
 
+def test_what_was_passed_over_is_not_paired_but_tells_how_late_it_came():
+    pairing = FramePairing(('left', 'right'), 50 * MS)
+    for k in range(10):
+        pairing.add('left', k * PERIOD, None)
+    pairing.pass_over(9 * PERIOD)
+    for k in range(7, 10):
+        assert pairing.add('right', k * PERIOD, None) is None
+    assert pairing.lag_ns == PERIOD
+    assert pairing.unpaired == {'left': 10, 'right': 3}
+    assert pairing.add('left', 10 * PERIOD, None) is None
+    assert stamps(pairing.add('right', 10 * PERIOD, None)) == [330, 330]
+
+
 def waiting(pairing, camera):
     """How many frames of a camera wait: those that are dropped at once."""
     before = pairing.unpaired[camera]

@@ -160,10 +160,10 @@ class FramePairing:
         track = self._tracks[camera]
         if track.add(Stamped(stamp_ns, frame), nbytes):
             self._passed_ns = -inf
-        elif stamp_ns <= self._passed_ns:
+        self._make_room(camera, stamp_ns)
+        if stamp_ns <= self._passed_ns:
             track.clear()
             return None
-        self._make_room(camera, stamp_ns)
         tracks = list(self._tracks.values())
         while all(track.waiting for track in tracks):
             stamps = [track.head.stamped.stamp_ns for track in tracks]
