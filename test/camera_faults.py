@@ -66,6 +66,7 @@ def check_camera_fault(field: Field, break_it, capture: str, stitcher: str) -> N
     # All is well, too, after a try that a busy machine was too slow for.
     wait_for(lambda: health.level(capture) < ERROR, START_S, 'a capture without ERROR')
     wait_for(lambda: health.level(stitcher) == OK, START_S, 'a stitcher that is well')
+    begin_s = time.monotonic()
     with field.injured(f'left camera: {break_it.__name__}', 'left'):
         mend = break_it(cameras)
         try:
@@ -86,6 +87,7 @@ def check_camera_fault(field: Field, break_it, capture: str, stitcher: str) -> N
             wait_for(is_lively, START_S, 'the rate of the living side')
         finally:
             mend()
+    assert health.came_in_order(begin_s), 'no picture came again, nor an older one'
     print(f'  {capture} said: {said}')
     wait_for(lambda: health.level(capture) < ERROR, START_S, 'no ERROR any more')
     wait_for(lambda: health.level(stitcher) == OK, START_S, 'all well')

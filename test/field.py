@@ -20,6 +20,8 @@ from fisheye_testing.waiting import wait_for
 
 START_S = 60.0
 """For what happens some time, even where much else runs too."""
+BUSY_S = 180.0
+"""For what other work on the machine holds up: that ends some time."""
 RETURN_S = 3.0
 """Within it the panorama is whole again when what was broken is back."""
 STOP_S = 2.0
@@ -177,8 +179,6 @@ class Field(RigProcesses):
         )
         self.check_alive()
         assert others == {name: p.pid for name, p in self.processes.items() if name != node}
-        came = [entry.stamp_ns for entry in self.health.seen if entry.arrived_s > begin_s]
-        assert came == sorted(set(came)), 'each panorama once, in order'
         if any(part not in sides and cost[part] >= UNNOTICED_S for part in cost):
             raise TooSlowError(f'{what}: {cost}')
         print('nothing else was affected')

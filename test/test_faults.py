@@ -1,6 +1,7 @@
 """Five nodes whose cameras go, stall and send nonsense; each killed and started again."""
 
 import signal
+import time
 
 import camera_faults
 import pytest
@@ -36,7 +37,7 @@ def test_a_node_is_killed_and_comes_back(five, node):
     health = five.health
     wait_for(lambda: health.is_measured, START_S, 'an overlap')
     (before,) = health.overlaps.overlaps
-    side = node.split('/')[0]
+    side, begin_s = node.split('/')[0], time.monotonic()
     with five.injured(f'kill -9 of {node}', 'panorama' if node == 'stitch' else side, node=node):
         known = five.endpoints(node)
         five.stop(node, signal.SIGKILL)
@@ -46,6 +47,7 @@ def test_a_node_is_killed_and_comes_back(five, node):
             wait_for(lambda: any(health.is_dim(health.seen[-1])), START_S, 'the dimming')
         five.start_again(node)
         wait_for(lambda: five.endpoints(node) - known, START_S, f'{node} in the graph')
+    assert health.came_in_order(begin_s), 'no picture came again, nor an older one'
     wait_for(lambda: health.is_measured, START_S, 'the overlap')
     (after,) = health.overlaps.overlaps
     assert after.offset_x_px == pytest.approx(before.offset_x_px, abs=SAME_PX)

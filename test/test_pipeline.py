@@ -6,7 +6,7 @@ import os
 import time
 
 import pytest
-from field import MAY_LOSE, START_S, STOP_S, calibrated
+from field import BUSY_S, MAY_LOSE, START_S, STOP_S, calibrated
 from sensor_msgs.msg import CameraInfo, CompressedImage
 
 from fisheye_bridge.camera_info import camera_of
@@ -68,7 +68,7 @@ def test_every_pair_arrives_and_every_node_ends_at_once(rig, watcher, composed):
         )
 
     # Other work on the machine ends some time.
-    wait_for(every_pair_arrives, START_S, 'a while in which hardly a pair gets lost')
+    wait_for(every_pair_arrives, BUSY_S, 'a while in which hardly a pair gets lost')
     took_s = {}
     for node in reversed(COMPOSED if composed else SEPARATE):
         code, took_s[node] = rig.stop(node)
@@ -100,8 +100,13 @@ def test_the_synthetic_rig_is_stitched_where_it_should_be(rig, watcher):
     seam_px = overlap.seam_begin_px, overlap.seam_end_px
     assert overlap.right_begin_px <= seam_px[0] < seam_px[1] <= overlap.left_end_px
     size = (projection.height, projection.width, 3)
-    wait_for(lambda: watcher.picture().shape == size, START_S, 'a panorama of that projection')
-    assert watcher.picture().any(axis=2).all(), 'no black inside'
+
+    def is_whole():
+        picture = watcher.picture()
+        # On a busy machine a camera may be stale for a moment, and its age is written in black.
+        return picture.shape == size and picture.any(axis=2).all()
+
+    wait_for(is_whole, START_S, 'a panorama of that projection with no black inside')
 
 
 @pytest.mark.parametrize('name', ['workshop', 'hall', 'forest', 'apartment', 'bridge'])

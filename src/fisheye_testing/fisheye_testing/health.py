@@ -88,6 +88,11 @@ class Health(Watcher):
         left, right = shown @ dim
         return float(gaps[gaps > _LONG_GAP_S].sum()), float(left), float(right)
 
+    def came_in_order(self, since_s: float) -> bool:
+        """Whether each panorama since a time was later than the one before."""
+        stamps = [entry.stamp_ns for entry in self.seen if entry.arrived_s > since_s]
+        return stamps == sorted(set(stamps))
+
     def level(self, node: str) -> bytes:
         """Return the last level of a node in /diagnostics; STALE where there is none."""
         return self.status[node].level if node in self.status else DiagnosticStatus.STALE
