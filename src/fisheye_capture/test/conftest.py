@@ -108,7 +108,7 @@ def ros(wait_until):
                 self.executor.spin_once(timeout_sec=0.05)
                 return condition()
 
-            wait_until(spun, what)
+            return wait_until(spun, what)
 
         def hear(self, topic):
             self.ear.heard.pop(topic, None)

@@ -63,15 +63,12 @@ def test_a_picture_that_was_not_published_is_not_counted_as_handled(ros, monkeyp
     monkeypatch.setattr(ImagePublisher, 'publish_picture', lambda *_: release.wait())
     try:
         ros.start(source='synthetic', frame_rate_hz=100.0, width=64, height=48)
-        told = []
 
-        def is_told():
+        def told():
             said = ros.hear('/diagnostics').status[0].message
-            told[:] = re.findall(r'(\d+) of the last (\d+) pictures were shed', said)
-            return told
+            return re.search(r'(\d+) of the last (\d+) pictures were shed', said)
 
-        ros.spin_until(is_told, 'what was shed')
-        ((shed, came),) = told
+        shed, came = ros.spin_until(told, 'what was shed').groups()
         in_work_or_next = 2
         assert int(came) - int(shed) <= in_work_or_next
     finally:

@@ -27,16 +27,31 @@ def test_panoramas_go_on_while_the_overlap_is_measured(make_line, pictures):
     assert answer.result()[0].found
 
 
-def test_who_asks_again_meanwhile_gets_the_same_measurement(make_line, pictures, monkeypatch):
-    measure, resume = compositor_builder.measure_overlaps, threading.Event()
+@pytest.fixture
+def hold_measurements(monkeypatch):
+    """Make measurements wait; gives the events that tell that one began, and that let them go."""
+    measure = compositor_builder.measure_overlaps
 
-    def measure_late(*arguments):
-        resume.wait(DEADLINE_S)
-        return measure(*arguments)
+    def hold():
+        is_measuring, resume = threading.Event(), threading.Event()
 
+        def measure_late(*arguments):
+            is_measuring.set()
+            resume.wait(DEADLINE_S)
+            return measure(*arguments)
+
+        monkeypatch.setattr(compositor_builder, 'measure_overlaps', measure_late)
+        return is_measuring, resume
+
+    return hold
+
+
+def test_who_asks_again_meanwhile_gets_the_same_measurement(
+    make_line, pictures, hold_measurements
+):
     line = make_line()
     line.feed(pictures, lambda: line.published, 'a panorama')
-    monkeypatch.setattr(compositor_builder, 'measure_overlaps', measure_late)
+    _, resume = hold_measurements()
     first = line.pipeline.calibrate('correlation', save=False)
     assert line.pipeline.calibrate('correlation', save=False) is first
     other = line.pipeline.calibrate('', save=False)
@@ -263,20 +278,12 @@ def test_the_published_rule_asked_for_once_ruins_no_rig(make_line, pictures):
 
 
 def test_a_setting_that_changes_while_an_overlap_is_sought_need_not_wait(
-    make_line, pictures, monkeypatch
+    make_line, pictures, monkeypatch, hold_measurements
 ):
     monkeypatch.setattr(compositor_builder, '_FIRST_PAUSE_S', 60.0)
     line = make_line(replace(SETTINGS, stale_after_s=60.0))
     dark = {camera: np.zeros_like(picture) for camera, picture in pictures.items()}
-    measure = compositor_builder.measure_overlaps
-    is_measuring, resume = threading.Event(), threading.Event()
-
-    def measure_late(*arguments):
-        is_measuring.set()
-        resume.wait(DEADLINE_S)
-        return measure(*arguments)
-
-    monkeypatch.setattr(compositor_builder, 'measure_overlaps', measure_late)
+    is_measuring, resume = hold_measurements()
     line.feed(dark, is_measuring.is_set, 'a search')
     line.pipeline.apply(replace(SETTINGS, stale_after_s=60.0, crop='none', feather_deg=3.0))
     is_measuring.clear()
